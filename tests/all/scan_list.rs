@@ -1,4 +1,5 @@
-//! `scans.bin` itself: what a crash leaves, what damage does. Its life beside the map is in `snapshots` and `faults`.
+//! Tests of `scans.bin`: remains of a crash, and damage. The tests in `snapshots` and `faults` cover it together with
+//! the map.
 
 use std::fs;
 use std::path::Path;
@@ -65,7 +66,7 @@ fn a_map_lists_the_scans_of_its_last_flush() {
 }
 
 #[test]
-fn what_a_killed_writer_left_is_passed_over_and_cut_off() {
+fn uncommitted_records_of_a_killed_writer_are_ignored_and_truncated() {
     let folder = TempDir::new().unwrap();
     let map = folder.path().join("map");
     let mut mapper = make_map(&map, 2);
@@ -76,7 +77,7 @@ fn what_a_killed_writer_left_is_passed_over_and_cut_off() {
     mapper.flush().unwrap();
     let with_more = fs::read(&path).unwrap();
     drop(mapper);
-    // Another map in which only the first flush came to its commit.
+    // Another map in which only the first flush was committed.
     for length in committed.len()..=with_more.len() {
         let other = folder.path().join(format!("other {length}"));
         let mut mapper = make_map(&other, 2);
@@ -98,7 +99,7 @@ fn what_a_killed_writer_left_is_passed_over_and_cut_off() {
 }
 
 #[test]
-fn every_damaged_byte_is_found_and_repair_keeps_what_comes_before_it() {
+fn any_damaged_byte_is_found_and_repair_keeps_the_records_before_it() {
     let folder = TempDir::new().unwrap();
     for at in (0..16 + 3 * 64).step_by(5) {
         let map = folder.path().join(at.to_string());
@@ -112,7 +113,7 @@ fn every_damaged_byte_is_found_and_repair_keeps_what_comes_before_it() {
 }
 
 #[test]
-fn a_list_that_was_cut_or_removed_is_found() {
+fn a_truncated_or_removed_list_is_found() {
     let folder = TempDir::new().unwrap();
     for length in [None, Some(0), Some(15), Some(16), Some(79), Some(80), Some(207)] {
         let map = folder.path().join(format!("{length:?}"));
@@ -126,7 +127,7 @@ fn a_list_that_was_cut_or_removed_is_found() {
     }
 }
 
-/// Damage in the list at a byte is found, and repaired up to it.
+/// Checks that damage at a byte of the list is found, and that repair keeps the records before it.
 fn check_damage(map: &Path, at: usize, what: &str) {
     assert!(!verify(map, |_| (), |_, _| ()).unwrap().is_whole(), "{what}");
     assert!(MapReader::open(map, 1 << 20).unwrap().scans().is_err(), "{what}");
@@ -140,9 +141,9 @@ fn check_damage(map: &Path, at: usize, what: &str) {
 }
 
 #[test]
-fn a_mapper_that_goes_on_behind_damage_keeps_the_list_as_it_was() {
+fn a_mapper_that_continues_after_damage_keeps_the_damaged_list() {
     let folder = TempDir::new().unwrap();
-    // A byte that is another one, or the length that is left.
+    // The position of a changed byte, or the remaining length.
     let flips = (0..16 + 3 * 64).step_by(5).map(|at| (at, true));
     let cuts = [0, 15, 16, 79, 80, 207].map(|length| (length, false));
     for (at, is_flip) in flips.chain(cuts) {

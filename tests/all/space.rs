@@ -7,8 +7,8 @@ use voxtile::space::{Point, TileIndex};
 use voxtile::{InMemoryMapper, MapConfig, MapPath, MapQueries, MapReader, Mapper, OutOfCoreTileMapper, Scan};
 
 #[test]
-fn far_negative_and_border_tiles_come_back_to_the_bit() {
-    // Origin, UTM, ECEF, the wrap of the 16-bit keys at 0.1 m, the far corner of OctoMap's range.
+fn far_negative_and_border_tiles_are_read_back_exactly() {
+    // Origin, UTM, ECEF, the wrap of the 16-bit keys at 0.1 m, and the far corner of OctoMap's range.
     let centers: [Point; 6] = [
         [0.0, -0.0, 0.0],
         [515_400.0, 4_918_360.0, 2_330.0],
@@ -40,7 +40,7 @@ fn far_negative_and_border_tiles_come_back_to_the_bit() {
 }
 
 #[test]
-fn a_dyadic_scan_shifted_by_whole_tiles_gives_the_same_voxels_shifted() {
+fn a_dyadic_scan_shifted_by_whole_tiles_gives_the_shifted_voxels() {
     let config = MapConfig::new(0.125, 4.0).unwrap();
     let mut random = Random(4);
     let mut dyadic = |range: u64| (random.below(range) as f64 - range as f64 / 2.0) / 64.0;
@@ -52,18 +52,18 @@ fn a_dyadic_scan_shifted_by_whole_tiles_gives_the_same_voxels_shifted() {
         mapper.insert_scan(scan).unwrap();
         voxels_of(&mapper)
     };
-    let at_home = map(&scan);
+    let original = map(&scan);
     let tiles = [131_072, -524_288, 1];
-    let away = map(&scan.translated(tiles.map(|tiles| f64::from(tiles) * 4.0)));
-    let shifted: Voxels = at_home
+    let shifted_map = map(&scan.translated(tiles.map(|tiles| f64::from(tiles) * 4.0)));
+    let shifted: Voxels = original
         .into_iter()
         .map(|(voxel, evidence)| (std::array::from_fn(|k| voxel[k] + tiles[k] * 32), evidence))
         .collect();
-    assert_eq!(away, shifted);
+    assert_eq!(shifted_map, shifted);
 }
 
 #[test]
-fn minus_zero_and_tile_borders_have_one_home() {
+fn minus_zero_and_tile_borders_belong_to_one_tile() {
     let config = MapConfig::new(0.5, 2.0).unwrap();
     let mut mapper = InMemoryMapper::new(config).unwrap();
     let points = [[-0.0, 0.0, 2.0], [0.0, -0.0, 1.9999], [-1e-300, 0.0, -2.0]];

@@ -22,7 +22,7 @@ fn configs() -> Vec<MapConfig> {
     configs
 }
 
-/// Some of the tiles around the drive, or a box of them.
+/// Returns some tiles around the drive, or a box of tiles.
 fn random_selection(random: &mut Random) -> TileSelection {
     let [low, high] = [0, 0].map(|_| [0; 3].map(|_: i32| random.below(7) as i32 - 3));
     let corners = TileBox::new(
@@ -35,7 +35,7 @@ fn random_selection(random: &mut Random) -> TileSelection {
     }
 }
 
-/// The naive map after a scan that counts in some tiles only.
+/// Inserts a scan into the naive map, but only in the selected tiles.
 fn insert_in(reference: &mut ReferenceMap, scan: &voxtile::Scan, tiles: &TileSelection) {
     let before = reference.voxels.clone();
     reference.insert_scan(scan);
@@ -47,7 +47,7 @@ fn insert_in(reference: &mut ReferenceMap, scan: &voxtile::Scan, tiles: &TileSel
 }
 
 #[test]
-fn scans_in_some_tiles_make_the_naive_map_of_these_tiles() {
+fn scans_in_selected_tiles_equal_the_naive_map_of_these_tiles() {
     for (seed, config) in (0..).zip(configs()) {
         let disk = FaultyDisk::new(Fault::None);
         let path = MapPath::on(disk.shared(), "map");
@@ -84,7 +84,7 @@ fn scans_in_some_tiles_make_the_naive_map_of_these_tiles() {
     }
 }
 
-/// Boxes that partition space, with faces that are not borders of tiles.
+/// Returns boxes that partition space. Their faces are not at tile borders.
 fn regions() -> Vec<Aabb> {
     let (low, high) = (f64::NEG_INFINITY, f64::INFINITY);
     let region = |min, max| Aabb { min, max };
@@ -97,7 +97,7 @@ fn regions() -> Vec<Aabb> {
 }
 
 #[test]
-fn maps_of_regions_that_partition_space_merge_to_the_map_of_the_whole() {
+fn maps_of_regions_that_partition_space_merge_to_the_whole_map() {
     let scans: Vec<_> = Survey::street(3).take(4).collect();
     for sensor_model in [SensorModel::default(), SensorModel::Iwlo(Iwlo::default())] {
         for insert_mode in [InsertMode::PerScan, InsertMode::PerRay] {
@@ -138,7 +138,7 @@ fn maps_of_regions_that_partition_space_merge_to_the_map_of_the_whole() {
 }
 
 #[test]
-fn a_map_of_a_region_knows_it_and_goes_on_with_no_other() {
+fn a_map_of_a_region_stores_it_and_refuses_another() {
     let disk = FaultyDisk::new(Fault::None);
     let region = TileBox::new([0, -1, -1].into(), [1, 0, 0].into());
     let config = MapConfig::new(0.1, 1.6).unwrap().with_region(region);
@@ -162,7 +162,7 @@ fn a_map_of_a_region_knows_it_and_goes_on_with_no_other() {
 
     let mut mapper = OutOfCoreTileMapper::open(path(), config.clone()).unwrap();
     mapper.check_rays(&InputRecord::default()).unwrap();
-    // A selection counts within the region.
+    // A selection applies within the region.
     let tiles = [TileIndex::new(0, 0, 0), TileIndex::new(-1, 0, 0)].into_iter().collect();
     mapper.insert_points_in(&scan, &tiles).unwrap();
     insert_in(&mut reference, &scan, &tiles);

@@ -3,7 +3,7 @@ use voxtile::mapper::{MapView, OutOfCoreTileMapper};
 use voxtile::{InMemoryMapper, MapConfig, MapQueries, Mapper, Scan};
 use voxtile_simulation::Survey;
 
-/// A map with room for few tiles and little that waits is the map in memory.
+/// Checks that a map with a small cache and a small write buffer equals the map in memory. Returns the number of tiles.
 fn check(name: &str, resolution_m: f64, scans: impl Iterator<Item = Scan>) -> u64 {
     let folder = TempDir::new().unwrap();
     let config = MapConfig::new(resolution_m, 8.0 * resolution_m).unwrap();
@@ -20,7 +20,7 @@ fn check(name: &str, resolution_m: f64, scans: impl Iterator<Item = Scan>) -> u6
 }
 
 #[test]
-fn ways_that_are_hard_on_a_cache_give_the_map_in_memory() {
+fn trajectories_that_stress_the_cache_give_the_map_in_memory() {
     check("a tour", 0.5, Survey::tour(1, 400).step_by(20).take(20));
     check("laps", 0.5, Survey::laps(1, 2, 400).step_by(60).take(24));
     check("teleports", 0.5, Survey::teleports(1, 5_000.0, 400).take(8));

@@ -30,22 +30,22 @@ fn write(disk: &FaultyDisk, source: &InMemoryMapper) -> Result<WrittenMap> {
 }
 
 #[test]
-fn whatever_fails_and_wherever_the_power_goes_there_is_no_map_or_the_whole_one() {
+fn after_any_fault_there_is_no_map_or_the_complete_map() {
     let written = write(&FaultyDisk::new(Fault::None), &source()).unwrap();
     assert_eq!(written.tiles, source().tile_indices().len() as u64);
-    let look = |disk: &FaultyDisk| match MapReader::open(MapPath::on(disk.shared(), folder()), 0) {
+    let state = |disk: &FaultyDisk| match MapReader::open(MapPath::on(disk.shared(), folder()), 0) {
         Err(Error::NoMap { .. }) => None,
         opened => Some(opened.unwrap().digest().unwrap()),
     };
     let work = |disk: &FaultyDisk| write(disk, &source()).map(drop);
-    let job = Job::new(FaultyDisk::new(Fault::None), folder(), work, look).tidy();
+    let job = Job::new(FaultyDisk::new(Fault::None), folder(), work, state).tidy();
     let kinds: [fn(u64) -> Fault; 3] = [Fault::Fails, Fault::LosesSync, Fault::IsFull];
     sweep(&job, faults(&job, &kinds, 2), &[Left::Dropped, Left::Mended]);
     sweep(&job, faults(&job, &[Fault::Crashes], 2), &[&EVERY_CRASH[..], &[Left::Killed]].concat());
 }
 
 #[test]
-fn what_is_not_of_a_map_stays_and_is_in_the_way() {
+fn foreign_files_are_kept_and_prevent_a_new_map() {
     let source = source();
     let disk = FaultyDisk::new(Fault::None);
     write(&disk, &source).unwrap();
@@ -62,7 +62,7 @@ fn what_is_not_of_a_map_stays_and_is_in_the_way() {
 }
 
 #[test]
-fn nobody_else_makes_the_same_map_meanwhile_and_tiles_come_in_order() {
+fn a_second_writer_is_locked_out_and_tiles_must_be_in_order() {
     let source = source();
     let disk = FaultyDisk::new(Fault::None);
     let mut writer = MapWriter::create(MapPath::on(disk.shared(), folder()), source.config()).unwrap();

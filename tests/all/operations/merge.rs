@@ -9,7 +9,7 @@ use voxtile::operations::{Merged, Prefer};
 use voxtile::sensor::{Iwlo, LogOdds, SensorModel};
 use voxtile::{Error, MapConfig, MapPath, MapReader, Result};
 
-/// The rule, voxel by voxel, with nothing clever.
+/// Merges the maps voxel by voxel, as plainly as possible.
 fn naive(maps: &[Voxels], prefer: Option<Prefer>) -> Voxels {
     let mut merged = Voxels::new();
     for &voxel in maps.iter().flat_map(|map| map.keys()) {
@@ -61,8 +61,8 @@ fn have_common_tile(config: &MapConfig, maps: &[Voxels]) -> bool {
 }
 
 #[test]
-fn a_merge_is_the_naive_one_for_two_to_five_maps_and_every_preference() {
-    let mut most_maps = 0;
+fn a_merge_equals_the_naive_merge_for_two_to_five_maps_and_every_preference() {
+    let mut max_maps = 0;
     for seed in 0..60 {
         let mut random = Random(seed);
         let config = config(&mut random);
@@ -75,8 +75,8 @@ fn a_merge_is_the_naive_one_for_two_to_five_maps_and_every_preference() {
                 write_map(&disk, path, &config, voxels);
             }
             let before = disk.files();
-            // Of the other model only maps without a common tile go together by themselves: any preference says the
-            // same.
+            // With the IWLO model, maps with a common tile need a preference. Without a common tile, any preference
+            // gives the same result.
             let needs_choice = config.sensor_model.needs_intensity() && prefer.is_none();
             let merged = match merge(&disk, &paths, prefer) {
                 Err(Error::InvalidArgument { reason, .. })
@@ -100,14 +100,14 @@ fn a_merge_is_the_naive_one_for_two_to_five_maps_and_every_preference() {
             assert_eq!(reader.scan_number(), 0);
             assert_eq!(reader.config().storage, config.storage);
             let after = disk.files();
-            assert!(before.iter().all(|(path, bytes)| after[path] == *bytes), "the maps are as they were");
-            most_maps = most_maps.max(count);
+            assert!(before.iter().all(|(path, bytes)| after[path] == *bytes), "the maps are unchanged");
+            max_maps = max_maps.max(count);
         }
     }
-    assert_eq!(most_maps, 5);
+    assert_eq!(max_maps, 5);
 }
 
-/// Two maps in which the voxel (1, 2, 3) was seen occupied once.
+/// Returns two maps in which the voxel (1, 2, 3) was observed as occupied once.
 fn two(a: &MapConfig, b: &MapConfig) -> (FaultyDisk, [PathBuf; 2]) {
     let (disk, maps) = (disk(), [path("a"), path("b")]);
     let voxels = Voxels::from([([1, 2, 3], (0.85_f64.to_bits(), 1))]);
@@ -128,11 +128,11 @@ fn refusal(a: &MapConfig, b: &MapConfig, prefer: Option<Prefer>) -> String {
 }
 
 #[test]
-fn maps_that_do_not_go_together_are_refused_with_what_differs() {
+fn incompatible_maps_are_refused_and_the_difference_is_named() {
     let usual = MapConfig::new(0.5, 2.5).unwrap();
     let finer = MapConfig::new(0.25, 2.5).unwrap();
     let larger = MapConfig::new(0.5, 5.0).unwrap();
-    let surer =
+    let stronger =
         usual.clone().with_sensor_model(SensorModel::LogOdds(LogOdds { hit: 2.0, ..LogOdds::default() }));
     let iwlo = usual.clone().with_sensor_model(SensorModel::Iwlo(Iwlo::default()));
     let mut stricter = usual.clone();
@@ -143,7 +143,7 @@ fn maps_that_do_not_go_together_are_refused_with_what_differs() {
         let message = refusal(&usual, &larger, prefer);
         assert!(message.contains("tile size 5 m, not 2.5 m"), "{message}");
     }
-    for (other, what) in [(&surer, "hit 2,"), (&iwlo, "iwlo"), (&stricter, "0.7")] {
+    for (other, what) in [(&stronger, "hit 2,"), (&iwlo, "iwlo"), (&stricter, "0.7")] {
         let message = refusal(&usual, other, None);
         assert!(
             message.contains("/maps/b") && message.contains(what) && message.contains("`prefer`"),
@@ -161,7 +161,7 @@ fn maps_that_do_not_go_together_are_refused_with_what_differs() {
 }
 
 #[test]
-fn maps_that_go_back_to_the_same_one_are_named() {
+fn maps_with_a_common_history_are_named() {
     let usual = MapConfig::new(0.5, 2.5).unwrap();
     let (disk, [a, b]) = two(&usual, &usual);
     let merged = merge(&disk, &[a.clone(), b, a], None).unwrap();
@@ -172,7 +172,7 @@ fn maps_that_go_back_to_the_same_one_are_named() {
 }
 
 #[test]
-fn a_damaged_tile_is_named_and_there_is_no_map() {
+fn a_damaged_tile_is_named_and_no_map_is_written() {
     let usual = MapConfig::new(0.5, 2.5).unwrap();
     let (disk, maps) = two(&usual, &usual);
     let table =
@@ -186,9 +186,9 @@ fn a_damaged_tile_is_named_and_there_is_no_map() {
     assert!(disk.files().keys().all(|path| path.starts_with(&maps[0]) || path.starts_with(&maps[1])));
 }
 
-/// The system is that of whichever map names one, and two that name others do not go together, whichever come first.
+/// The system is that of any map that names one. Maps with different systems are incompatible in any order.
 #[test]
-fn a_merge_has_the_coordinate_reference_system_that_one_of_the_maps_names() {
+fn a_merge_keeps_the_coordinate_reference_system_of_its_maps() {
     let systems = [None, Some("EPSG:25832"), Some("EPSG:25833")];
     let disk = disk();
     for (k, crs) in systems.into_iter().enumerate() {
@@ -214,7 +214,7 @@ fn a_merge_has_the_coordinate_reference_system_that_one_of_the_maps_names() {
 }
 
 #[test]
-fn maps_without_a_common_tile_need_no_preference_whatever_their_model() {
+fn maps_without_a_common_tile_need_no_preference_for_any_model() {
     let (disk, mut random) = (disk(), Random(3));
     let grid = MapConfig::new(0.1, 1.0).unwrap();
     let strict = LogOdds::from_probabilities(0.6, 0.45, 0.2, 0.9).unwrap();

@@ -1,5 +1,3 @@
-/// Replacement of tiles compared with a naive map; incompatible parts are errors.
-mod adopt;
 /// Crop and clear compared with filters; crops merged to the whole.
 mod cut;
 /// Decay compared with the rule, voxel by voxel; applied once.
@@ -14,3 +12,5 @@ mod map_writer;
 mod merge;
 /// Maps of random voxels, written and read back.
 mod random_maps;
+/// Replacement of tiles compared with a naive map; incompatible parts are errors.
+mod replace_tiles;

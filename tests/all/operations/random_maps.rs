@@ -9,7 +9,7 @@ use voxtile::space::VoxelKey;
 use voxtile::tile::Table;
 use voxtile::{MapConfig, MapPath, MapReader, Result, Storage};
 
-/// Tiles of 5 voxels, so that bricks of 8 reach across their borders.
+/// Returns a configuration with tiles of 5 voxels, so that bricks of 8 voxels cross their borders.
 pub fn config(random: &mut Random) -> MapConfig {
     let config = MapConfig::new(0.5, 2.5).unwrap();
     let config = if random.below(3) == 0 {
@@ -20,11 +20,12 @@ pub fn config(random: &mut Random) -> MapConfig {
     config.with_storage([Storage::OctoMap, Storage::Compact][random.below(2) as usize])
 }
 
-/// Up to `most` voxels around a place: few values many times, any values, those at and beyond the clamps.
-pub fn random_voxels(random: &mut Random, most: u64) -> Voxels {
+/// Returns up to `max_voxels` voxels around a center. The values are repeated, random, or at and beyond the clamping
+/// limits.
+pub fn random_voxels(random: &mut Random, max_voxels: u64) -> Voxels {
     let center = [0, -70, 32_766][random.below(3) as usize];
     let mut voxels = Voxels::new();
-    for _ in 0..random.below(most + 1) {
+    for _ in 0..random.below(max_voxels + 1) {
         let voxel = [center, 3, -2].map(|c| c + random.below(12) as i32 - 6);
         let log_odds = match random.below(8) {
             0 => random.between(-12.0, 12.0),
@@ -42,7 +43,7 @@ pub fn random_voxels(random: &mut Random, most: u64) -> Voxels {
     voxels
 }
 
-/// Makes a map of these voxels.
+/// Writes a map of these voxels.
 pub fn write_map(disk: &FaultyDisk, folder: &Path, config: &MapConfig, voxels: &Voxels) {
     let mut tiles: BTreeMap<_, Voxels> = BTreeMap::new();
     for (&voxel, &evidence) in voxels {
@@ -71,7 +72,7 @@ pub fn open(disk: &FaultyDisk, folder: &Path) -> Result<MapReader> {
     MapReader::open(MapPath::on(disk.shared(), folder), 0)
 }
 
-/// The voxels of a map on disk.
+/// Returns the voxels of a map on disk.
 pub fn read_map(disk: &FaultyDisk, folder: &Path) -> Voxels {
     voxels_of(&open(disk, folder).unwrap_or_else(|error| panic!("{error:#}")))
 }
@@ -85,7 +86,7 @@ pub fn disk() -> FaultyDisk {
 }
 
 #[test]
-fn what_is_written_is_read_back() {
+fn written_voxels_are_read_back() {
     for seed in 0..40 {
         let mut random = Random(seed);
         let (disk, config) = (disk(), config(&mut random));
