@@ -525,10 +525,12 @@ impl Mapper for OutOfCoreTileMapper {
         let mut left = scans;
         while !left.is_empty() {
             let most = self.tracer.max_concurrent(left.len());
-            let beside = left[..most].iter().take_while(|scan| scan.len() < self.min_points_alone).count();
-            let inserted = if beside > 1 { self.insert_concurrently(&left[..beside], reports)? } else { 0 };
+            let concurrent =
+                left[..most].iter().take_while(|scan| scan.len() < self.min_points_alone).count();
+            let inserted =
+                if concurrent > 1 { self.insert_concurrently(&left[..concurrent], reports)? } else { 0 };
             left = &left[inserted..];
-            if inserted < beside.max(1)
+            if inserted < concurrent.max(1)
                 && let Some((alone, others)) = left.split_first()
             {
                 reports.push(self.insert_points(*alone)?);

@@ -159,7 +159,7 @@ fn dense_rays_in_little_memory_give_the_same_updates_with_any_number_of_threads(
 #[test]
 fn concurrent_scans_give_the_same_updates_and_large_ones_are_rejected() {
     let scans = [dense(2_000, 3.0), dense(50, 3.0), dense(2_000, 12.0), dense(2, 1.0), dense(400, 4.0)];
-    let beside: Vec<&dyn ScanPoints> = scans.iter().map(|scan| scan as _).collect();
+    let references: Vec<&dyn ScanPoints> = scans.iter().map(|scan| scan as _).collect();
     for setting in settings(10.0) {
         let Setting { grid, model, rays, order, .. } = &setting;
         let rules = TraceRules { mapped: MappedTiles { grid, selection: None }, model, rays, order: *order };
@@ -170,7 +170,7 @@ fn concurrent_scans_give_the_same_updates_and_large_ones_are_rejected() {
             let mut tracer = bytes.map_or(ScanTracer::default(), ScanTracer::with_memory_bytes);
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
             for _ in 0..2 {
-                let traced = pool.install(|| tracer.trace_concurrently(rules, &beside));
+                let traced = pool.install(|| tracer.trace_concurrently(rules, &references));
                 for (number, (alone, updates)) in alone.iter().zip(traced).enumerate() {
                     let fits = bytes.is_none() || (limited && (number != 2 || bytes > Some(16 << 20)));
                     let updates = updates.unwrap();

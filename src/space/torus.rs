@@ -175,9 +175,9 @@ mod tests {
             for (&cell, &number) in &naive {
                 prop_assert_eq!(torus.get(cell), number);
                 for axis in 0..3 {
-                    let mut beside = cell;
-                    beside[axis] = beside[axis].wrapping_add(1);
-                    prop_assert_eq!(torus.get(beside), naive.get(&beside).copied().unwrap_or(Torus::NONE));
+                    let mut neighbor = cell;
+                    neighbor[axis] = neighbor[axis].wrapping_add(1);
+                    prop_assert_eq!(torus.get(neighbor), naive.get(&neighbor).copied().unwrap_or(Torus::NONE));
                 }
             }
         }

@@ -108,9 +108,9 @@ fn moved(disk: &FaultyDisk) -> Result<()> {
 
 fn moved_online(disk: &FaultyDisk) -> Result<()> {
     let how = Remap::new(replay().with_keep_as(name("before")));
-    let mut beside = OnlineRemap::begin(&scans(disk)?, &new_poses(), &how)?;
-    beside.follow(|_| ())?;
-    beside.finish().map(drop)
+    let mut online = OnlineRemap::begin(&scans(disk)?, &new_poses(), &how)?;
+    online.follow(|_| ())?;
+    online.finish().map(drop)
 }
 
 fn removed(disk: &FaultyDisk) -> Result<()> {
@@ -445,9 +445,9 @@ fn a_revert_removes_unneeded_kept_scans() {
 #[test]
 fn a_removal_completes_the_removal_of_a_second_map() {
     let start = four_scans(Storage::Compact, true);
-    let beside = OnlineRemap::begin(&scans(&start).unwrap(), &new_poses(), &Remap::new(replay())).unwrap();
+    let online = OnlineRemap::begin(&scans(&start).unwrap(), &new_poses(), &Remap::new(replay())).unwrap();
     let start = start.after_kill();
-    drop(beside);
+    drop(online);
     let second = Path::new("/city/map.remapping");
     let has_second = |disk: &FaultyDisk| disk.files().keys().any(|path| path.starts_with(second));
     for gone in [&["metadata.json"][..], &["commits.log"], &["metadata.json", "commits.log"]] {
@@ -465,9 +465,9 @@ fn a_removal_completes_the_removal_of_a_second_map() {
 fn a_removal_removes_the_second_map_of_a_killed_remap() {
     let start = four_scans(Storage::Compact, true);
     delete_snapshot(at(&start), &name("third")).unwrap();
-    let beside = OnlineRemap::begin(&scans(&start).unwrap(), &new_poses(), &Remap::new(replay())).unwrap();
+    let online = OnlineRemap::begin(&scans(&start).unwrap(), &new_poses(), &Remap::new(replay())).unwrap();
     let disk = start.after_kill();
-    drop(beside);
+    drop(online);
     let second = Path::new("/city/map.remapping");
     assert!(findings(&disk).1.contains(second));
     removed(&disk).unwrap();

@@ -19,8 +19,8 @@ fn is_refused<T: fmt::Debug>(work: impl FnOnce(MapPath) -> Result<T>) {
     let mut mapper = OutOfCoreTileMapper::create(at(&disk), config()).unwrap();
     insert(&mut mapper, 1.0);
     drop(mapper);
-    let beside = disk.clone();
-    disk.before_lock(move || insert(&mut OutOfCoreTileMapper::open(at(&beside), config()).unwrap(), 2.0));
+    let other = disk.clone();
+    disk.before_lock(move || insert(&mut OutOfCoreTileMapper::open(at(&other), config()).unwrap(), 2.0));
     let message = message_of(work(at(&disk)));
     assert!(message.contains("flushed while it was being read"), "{message}");
     let wanted = FaultyDisk::new(Fault::None);

@@ -81,8 +81,8 @@ fn a_kept_table_takes_the_place_of_a_damaged_one_with_the_same_bytes() {
             let (whole, table) = (disk.copy(), TileFile::Table.name(storage));
             let files = whole.files();
             let is_twice = |path: &Path, bytes: &[u8]| {
-                let is_same = |(beside, kept): (&PathBuf, &Vec<u8>)| {
-                    beside.parent() == path.parent() && beside != path && kept == bytes
+                let is_same = |(other, kept): (&PathBuf, &Vec<u8>)| {
+                    other.parent() == path.parent() && other != path && kept == bytes
                 };
                 path.ends_with(table) && files.iter().any(is_same)
             };

@@ -300,7 +300,7 @@ fn check_room(stored: usize, points: usize) -> Result<()> {
         return Ok(());
     }
     let reason = format!(
-        "{points} points beside {stored} voxels may be more than the {MAX_NUMBERED} that a local map numbers; \
+        "{points} points and the {stored} stored voxels may exceed the {MAX_NUMBERED} voxels of a local map; \
          limit the map (`LocalParameters::max_voxels`) or split the scan"
     );
     Err(Error::argument("points of the scan", reason))

@@ -37,9 +37,9 @@ fn names(folder: &Path) -> Vec<String> {
     names
 }
 
-fn origin_beside(file: &Path) -> Option<Value> {
-    let beside = file.with_added_extension("origin.json");
-    fs::read(beside).ok().map(|text| serde_json::from_slice(&text).unwrap())
+fn origin_file_of(file: &Path) -> Option<Value> {
+    let origin_file = file.with_added_extension("origin.json");
+    fs::read(origin_file).ok().map(|text| serde_json::from_slice(&text).unwrap())
 }
 
 /// Returns the voxel centers of a CSV file in metres, relative to the file's origin.
@@ -224,8 +224,8 @@ fn nothing_is_created_inside_a_map() {
     assert_eq!(names(&map), before);
     output(&["verify", text(&map)]);
     // A folder next to the map, with a path through one of its tiles.
-    let beside = map.join(tile).join("../../a.ply");
-    output(&["export", text(&map), "-o", text(&beside)]);
+    let next_to_map = map.join(tile).join("../../a.ply");
+    output(&["export", text(&map), "-o", text(&next_to_map)]);
     assert!(folder.path().join("a.ply").exists());
 }
 
@@ -241,11 +241,11 @@ fn a_far_map_becomes_an_octree_file_with_an_origin() {
     let origin = ["--origin", "500000", "4182000", "0"];
     let printed = output(&[&["export", map, "-o", text(&file)], &origin[..]].concat());
     assert!(printed.contains("origin 500000 4182000 0 m"), "{printed}");
-    let beside = origin_beside(&file).unwrap();
-    assert_eq!(beside["origin_m"], serde_json::json!([500000.0, 4182000.0, 0.0]));
-    assert_eq!(beside["origin_voxel"], serde_json::json!([5_000_000, 41_820_000, 0]));
+    let origin_file = origin_file_of(&file).unwrap();
+    assert_eq!(origin_file["origin_m"], serde_json::json!([500000.0, 4182000.0, 0.0]));
+    assert_eq!(origin_file["origin_voxel"], serde_json::json!([5_000_000, 41_820_000, 0]));
     let hash = blake3::hash(&fs::read(&file).unwrap()).to_hex();
-    assert_eq!(beside["blake3"], hash.as_str());
+    assert_eq!(origin_file["blake3"], hash.as_str());
 
     // The voxels of the file are those of the map, moved by whole voxels.
     let (there, here) = (folder.path().join("there.csv"), folder.path().join("here.csv"));
@@ -272,7 +272,7 @@ fn a_far_map_becomes_an_octree_file_with_an_origin() {
         printed.contains("origin 500000 4182000.1 0 m") && printed.contains("nearest to 500000.04"),
         "{printed}"
     );
-    assert_eq!(origin_beside(&file).unwrap()["origin_m"][1], 4182000.1);
+    assert_eq!(origin_file_of(&file).unwrap()["origin_m"][1], 4182000.1);
     let summary = json(&[&arguments[..], &["--json"]].concat());
     assert_eq!(summary["origin_m"], serde_json::json!([500000.0, 4182000.1, 0.0]));
     assert!(summary["origin_file"].as_str().unwrap().ends_with("a.bt.origin.json"));
@@ -302,24 +302,24 @@ fn files_next_to_an_output_belong_to_it() {
     let (map, file) = (text(&map), folder.path().join("a.csv"));
     let origin = ["--origin", "1", "2", "3"];
     output(&[&["export", map, "-o", text(&file)], &origin[..]].concat());
-    assert!(origin_beside(&file).is_some());
+    assert!(origin_file_of(&file).is_some());
     let moved = centers(&file);
     // Without an origin, an origin file of an earlier export must not remain.
     output(&["export", map, "-o", text(&file)]);
-    assert!(origin_beside(&file).is_none());
+    assert!(origin_file_of(&file).is_none());
     for (moved, center) in moved.iter().zip(centers(&file)) {
         let back: [f64; 3] = std::array::from_fn(|k| moved[k] + [1.0, 2.0, 3.0][k] - center[k]);
         assert!(back.iter().all(|x| x.abs() < 1e-9), "{back:?}");
     }
     // A foreign file of that name is kept, and nothing is written.
-    let beside = folder.path().join("a.csv.origin.json");
-    fs::write(&beside, "{}").unwrap();
+    let foreign = folder.path().join("a.csv.origin.json");
+    fs::write(&foreign, "{}").unwrap();
     let before = fs::read(&file).unwrap();
     for arguments in [vec![], origin.to_vec()] {
         let (code, stderr) = failure(&[&["export", map, "-o", text(&file)], &arguments[..]].concat());
         assert!(code == 2 && stderr.contains("a.csv.origin.json"), "{stderr}");
     }
-    assert_eq!((fs::read(&beside).unwrap(), fs::read(&file).unwrap()), (b"{}".to_vec(), before));
+    assert_eq!((fs::read(&foreign).unwrap(), fs::read(&file).unwrap()), (b"{}".to_vec(), before));
 }
 
 #[test]
@@ -340,7 +340,7 @@ fn float32_points_of_a_pcd_map_to_their_voxels_at_any_distance() {
         let header = String::from_utf8_lossy(&bytes[..400]).into_owned();
         assert!(header.contains("\nSIZE 4 4 4 4 4\nTYPE F F F F I\n"), "{header}");
         assert_eq!(header.contains("# origin "), is_moved, "{header}");
-        assert_eq!(origin_beside(&cloud).is_some(), is_moved);
+        assert_eq!(origin_file_of(&cloud).is_some(), is_moved);
         let read = read_pcd(&bytes).unwrap();
         let origin = read.world_from_sensor.position_m();
         assert_eq!(serde_json::json!(origin), summary["origin_m"]);

@@ -58,10 +58,10 @@ impl Frames for ImageFrames {
         let Some(path) = self.paths.next() else { return Ok(None) };
         let mut head = self.stamps.head_of(&path);
         let stem = head.name.trim_end_matches(".png").trim_end_matches(".depth").to_owned();
-        let beside = path.with_file_name(format!("{stem}.pose.txt"));
-        check_regular(&beside)?;
-        if beside.is_file() {
-            match pose(&beside) {
+        let pose_file = path.with_file_name(format!("{stem}.pose.txt"));
+        check_regular(&pose_file)?;
+        if pose_file.is_file() {
+            match pose(&pose_file) {
                 Ok(pose) => head.world_from_sensor = pose,
                 Err(error @ Error::Malformed { .. }) => {
                     self.first_bad.get_or_insert_with(|| format!("{error:#}"));

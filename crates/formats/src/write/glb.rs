@@ -108,15 +108,15 @@ impl VoxelSink for GlbSink {
         for k in 0..3 {
             self.least[k] = self.least[k].min(voxel.index[k]);
             self.most[k] = self.most[k].max(voxel.index[k]);
-            let (mut beside, mut around) = (brick, place);
+            let (mut neighbor, mut around) = (brick, place);
             if place[k] == 0 {
-                (beside[k], around[k]) = (brick[k] - 1, edge);
+                (neighbor[k], around[k]) = (brick[k] - 1, edge);
             } else if place[k] == edge - 1 {
-                (beside[k], around[k]) = (brick[k] + 1, -1);
+                (neighbor[k], around[k]) = (brick[k] + 1, -1);
             } else {
                 continue;
             }
-            self.places.push(record(beside, around))?;
+            self.places.push(record(neighbor, around))?;
         }
         Ok(())
     }
@@ -381,10 +381,10 @@ mod tests {
         for voxel in &occupied {
             for axis in 0..3 {
                 for side in [-1, 1] {
-                    let (mut beside, mut normal) = (*voxel, [0; 3]);
-                    beside[axis] += side;
+                    let (mut neighbor, mut normal) = (*voxel, [0; 3]);
+                    neighbor[axis] += side;
                     normal[axis] = side;
-                    if !occupied.contains(&beside) {
+                    if !occupied.contains(&neighbor) {
                         expected.insert((std::array::from_fn(|k| 2 * voxel[k] + 1 + normal[k]), normal));
                     }
                 }

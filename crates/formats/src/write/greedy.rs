@@ -47,9 +47,9 @@ impl Brick {
                     for (column, is_exposed) in line.iter_mut().enumerate() {
                         let mut place = [0; 3];
                         (place[axis], place[u], place[v]) = (layer + 1, column + 1, row + 1);
-                        let mut beside = place;
-                        beside[axis] = if is_upper { layer + 2 } else { layer };
-                        *is_exposed = self.has(place) && !self.has(beside);
+                        let mut neighbor = place;
+                        neighbor[axis] = if is_upper { layer + 2 } else { layer };
+                        *is_exposed = self.has(place) && !self.has(neighbor);
                         is_empty &= !*is_exposed;
                     }
                 }

@@ -68,14 +68,14 @@ impl WriteOptions {
     /// of the output itself.
     pub(super) fn companion(&self, extension: &str, own: &str) -> Result<PathBuf> {
         let name = self.final_name()?;
-        let beside = Path::new(name).with_extension(extension);
+        let companion = Path::new(name).with_extension(extension);
         // Some file systems are case-insensitive.
-        if beside.to_str().is_some_and(|beside| beside.eq_ignore_ascii_case(name)) {
+        if companion.to_str().is_some_and(|companion| companion.eq_ignore_ascii_case(name)) {
             let hint = self.final_path.with_extension(own);
             let reason = format!("a companion file needs this name: name the output {}", hint.display());
             return Err(Error::argument(self.final_path.display().to_string(), reason));
         }
-        Ok(self.companion_folder.join(beside))
+        Ok(self.companion_folder.join(companion))
     }
 }
 

@@ -11,7 +11,7 @@ use voxtile::space::Grid;
 pub(super) struct MovedFile<'a> {
     export: &'a Export<'a>,
     /// Companion file; `None` for a stream.
-    beside: Option<OriginFile>,
+    origin_file: Option<OriginFile>,
 }
 
 impl<'a> MovedFile<'a> {
@@ -21,7 +21,7 @@ impl<'a> MovedFile<'a> {
     ///
     /// Another file has the name of the companion file.
     pub fn of(export: &'a Export<'a>) -> voxtile::Result<Self> {
-        Ok(Self { export, beside: OriginFile::of(&export.options.output)? })
+        Ok(Self { export, origin_file: OriginFile::of(&export.options.output)? })
     }
 
     /// Writes the file and, if the origin differs, its companion file.
@@ -40,17 +40,17 @@ impl<'a> MovedFile<'a> {
         });
         stop.check()?;
         let value = written?;
-        match &self.beside {
+        match &self.origin_file {
             // The companion file is written first. After a crash there may be a companion file without its output, but
             // never a shifted output without its companion file.
-            Some(beside) if origin.is_moved() => {
+            Some(origin_file) if origin.is_moved() => {
                 let hash = file.hash()?;
-                beside.write(output, hash, origin, grid)?;
+                origin_file.write(output, hash, origin, grid)?;
                 file.finish()?;
             }
-            Some(beside) => {
+            Some(origin_file) => {
                 file.finish()?;
-                beside.remove()?;
+                origin_file.remove()?;
             }
             None => file.finish()?,
         }
@@ -59,11 +59,11 @@ impl<'a> MovedFile<'a> {
 
     /// Returns the summary of the export.
     pub fn summary(&self, voxels: u64, origin: &ExportOrigin) -> ExportSummary {
-        let beside = self.beside.as_ref().filter(|_| origin.is_moved());
+        let origin_file = self.origin_file.as_ref().filter(|_| origin.is_moved());
         let written = Written::Stream {
             origin_m: origin.corner_m,
             origin_voxel: origin.voxel,
-            origin_file: beside.map(|beside| beside.path().to_owned()),
+            origin_file: origin_file.map(|file| file.path().to_owned()),
             requested_m: origin.requested_m,
         };
         self.export.summary(voxels, written)

@@ -47,17 +47,17 @@ impl StagedOutput {
     pub fn finish(self) -> Result<Vec<PathBuf>> {
         let own = self.path()?;
         let folder = folder_of(&self.target);
-        let beside = self.companions(&own)?;
+        let companions = self.companions(&own)?;
         let name_of = |from: &Path| from.file_name().map_or(self.target.clone(), |name| folder.join(name));
-        let mut names: Vec<PathBuf> = beside.iter().map(|from| name_of(from)).collect();
+        let mut names: Vec<PathBuf> = companions.iter().map(|from| name_of(from)).collect();
         // Check everything before the first rename.
-        for (from, to) in beside.iter().zip(&names) {
+        for (from, to) in companions.iter().zip(&names) {
             check_staged(from, to)?;
-            self.check_beside(from, to)?;
+            self.check_companion(from, to)?;
         }
         names.push(name_of(&own));
         check_staged(&own, &self.target)?;
-        for (from, to) in beside.iter().chain([&own]).zip(&names) {
+        for (from, to) in companions.iter().chain([&own]).zip(&names) {
             rename_over(from, to).map_err(|error| Error::io(to, "replace", error))?;
         }
         names.pop();
@@ -69,15 +69,15 @@ impl StagedOutput {
     fn companions(&self, own: &Path) -> Result<Vec<PathBuf>> {
         let list = fs::read_dir(self.folder()).and_then(Iterator::collect::<io::Result<Vec<_>>>);
         let list = list.map_err(|error| Error::io(self.folder(), "list", error))?;
-        let mut beside: Vec<PathBuf> =
+        let mut companions: Vec<PathBuf> =
             list.iter().map(fs::DirEntry::path).filter(|path| path != own).collect();
-        beside.sort_unstable();
-        Ok(beside)
+        companions.sort_unstable();
+        Ok(companions)
     }
 
     /// Checks that a companion file may be written. Companion files are not named by the user, so an existing one is
     /// replaced only if the output exists too (it then belongs to an earlier export) or if its content is the same.
-    fn check_beside(&self, from: &Path, to: &Path) -> Result<()> {
+    fn check_companion(&self, from: &Path, to: &Path) -> Result<()> {
         if self.target.exists() || !to.exists() || is_same(from, to)? {
             return Ok(());
         }

@@ -203,10 +203,10 @@ fn unknown_next_to_free(tile: &Tile, threshold: f64) -> FxHashSet<[i32; 3]> {
     for voxel in tile.voxels().filter(|voxel| voxel.evidence.log_odds < threshold) {
         for k in 0..3 {
             for step in [-1, 1] {
-                let mut beside = voxel.index;
-                beside[k] = beside[k].saturating_add(step);
-                if bounds.contains(beside) && tile.evidence(beside).is_none() {
-                    unknown.insert(beside);
+                let mut neighbor = voxel.index;
+                neighbor[k] = neighbor[k].saturating_add(step);
+                if bounds.contains(neighbor) && tile.evidence(neighbor).is_none() {
+                    unknown.insert(neighbor);
                 }
             }
         }

@@ -245,13 +245,13 @@ fn free_and_unknown_voxels_match_the_map() {
         let voxel = axes(cell.place).map(|k| k as i32);
         assert!(tile.evidence(voxel).is_none());
         let is_free = |voxel| tile.evidence(voxel).is_some_and(|evidence| evidence.log_odds < 0.0);
-        let beside = |k: usize, step: i32| {
-            let mut beside = voxel;
-            beside[k] += step;
-            beside
+        let neighbor = |k: usize, step: i32| {
+            let mut neighbor = voxel;
+            neighbor[k] += step;
+            neighbor
         };
         assert!(
-            (0..3).any(|k| is_free(beside(k, 1)) || is_free(beside(k, -1))),
+            (0..3).any(|k| is_free(neighbor(k, 1)) || is_free(neighbor(k, -1))),
             "{voxel:?} borders nothing free"
         );
     }
