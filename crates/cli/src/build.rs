@@ -1,4 +1,5 @@
 use crate::args::{BuildArgs, InsertName, ModelName};
+use crate::counted::Counted;
 use crate::failure::JsonTo;
 use crate::octree_choice::octree_config;
 use crate::part::region_of;
@@ -18,7 +19,8 @@ pub fn run(args: &BuildArgs) -> anyhow::Result<ExitCode> {
     summary::print(built, args.json)?;
     if interrupted {
         print_message(format_args!(
-            "stopped after {all} scans; all of them are in the map; continue with --resume"
+            "stopped after {}; all of them are in the map; continue with --resume",
+            Counted(all, "scan")
         ));
         return Ok(ExitCode::from(INTERRUPTED));
     }

@@ -1,4 +1,5 @@
 use crate::args::ClearArgs;
+use crate::counted::Counted;
 use crate::json;
 use crate::part::part_of;
 use crate::progress::Progress;
@@ -33,9 +34,9 @@ pub fn run(args: &ClearArgs) -> anyhow::Result<ExitCode> {
         let Cleared { voxels_cleared, tiles_changed, tiles_removed, tiles, .. } = cleared;
         writeln!(
             out,
-            "cleared   {} voxels in {} tiles",
-            HumanCount(voxels_cleared),
-            HumanCount(tiles_changed + tiles_removed)
+            "cleared   {} in {}",
+            Counted(voxels_cleared, "voxel"),
+            Counted(tiles_changed + tiles_removed, "tile")
         )?;
         writeln!(
             out,

@@ -1,4 +1,5 @@
 use crate::args::DecayArgs;
+use crate::counted::Counted;
 use crate::json;
 use crate::progress::Progress;
 use crate::quiet::summary_out;
@@ -32,7 +33,7 @@ pub fn run(args: &DecayArgs) -> anyhow::Result<ExitCode> {
         json::print(&summary, &mut out)?;
     } else {
         let Decayed { scans, factor, voxels, voxels_forgotten, tiles, tiles_removed, .. } = decayed;
-        writeln!(out, "decayed   by {} scans: log-odds times {factor:.6}", HumanCount(scans))?;
+        writeln!(out, "decayed   by {}: log-odds times {factor:.6}", Counted(scans, "scan"))?;
         if scans == 0 {
             writeln!(out, "          no scans since the last decay; --scans N sets the number")?;
         }

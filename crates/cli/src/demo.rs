@@ -1,4 +1,5 @@
 use crate::args::DemoArgs;
+use crate::counted::Counted;
 use crate::failure::JsonTo;
 use crate::octree_choice::octree_config;
 use crate::picture::write_png;
@@ -63,7 +64,8 @@ pub fn run(args: &DemoArgs) -> anyhow::Result<ExitCode> {
     if stop.is_set() {
         let all = done + inserted;
         let message = format!(
-            "stopped after {all} scans; all of them are in the map; run the same command to continue"
+            "stopped after {}; all of them are in the map; run the same command to continue",
+            Counted(all, "scan")
         );
         JsonTo::output_if(args.json).report_stopped(&message);
         return Ok(ExitCode::from(INTERRUPTED));

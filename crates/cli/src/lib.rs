@@ -7,6 +7,7 @@ mod build;
 mod clear;
 mod completions;
 mod convert;
+mod counted;
 mod crop;
 mod decay;
 mod demo;

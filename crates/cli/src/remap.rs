@@ -1,4 +1,5 @@
 use crate::args::{InsertName, ModelName, RemapArgs};
+use crate::counted::Counted;
 use crate::json;
 use voxtile_pipeline::{MapAt, whole_map};
 
@@ -64,14 +65,14 @@ pub fn run(args: &RemapArgs) -> anyhow::Result<ExitCode> {
     let moved = if args.replay.dry_run { "would move" } else { "moved" };
     writeln!(
         out,
-        "poses     {} scans {moved}, by up to {largest_move_m:.3} m and {largest_turn_deg:.3} degrees",
-        HumanCount(mapped.scans_changed)
+        "poses     {} {moved}, by up to {largest_move_m:.3} m and {largest_turn_deg:.3} degrees",
+        Counted(mapped.scans_changed, "scan")
     )?;
     if remapped.scans_within_tolerance > 0 {
         writeln!(
             out,
-            "left      {} scans unchanged: new poses differ by up to {:.3} m and {:.3} degrees",
-            HumanCount(remapped.scans_within_tolerance),
+            "left      {} unchanged: new poses differ by up to {:.3} m and {:.3} degrees",
+            Counted(remapped.scans_within_tolerance, "scan"),
             remapped.largest_move_left_m,
             remapped.largest_turn_left_deg
         )?;
@@ -124,8 +125,8 @@ fn build_another(args: &RemapArgs) -> anyhow::Result<ExitCode> {
         json::print(&mapped, &mut out)?;
         return Ok(ExitCode::SUCCESS);
     }
-    let (scans, points) = (HumanCount(mapped.scans), HumanCount(mapped.report.points));
-    writeln!(out, "mapped    {scans} scans, {points} points, to {}", output.display())?;
+    let (scans, points) = (Counted(mapped.scans, "scan"), Counted(mapped.report.points, "point"));
+    writeln!(out, "mapped    {scans}, {points}, to {}", output.display())?;
     let (voxels, occupied) = MapReader::open(output, 0)?.voxel_counts().unwrap_or_default();
     writeln!(out, "map       {} voxels, {} occupied", HumanCount(voxels), HumanCount(occupied))?;
     Ok(ExitCode::SUCCESS)

@@ -1,9 +1,9 @@
 use crate::args::RemovePointsArgs;
+use crate::counted::Counted;
 use crate::json;
 use crate::part::region_of;
 use crate::quiet::summary_out;
 use crate::replay::{self, Job};
-use indicatif::HumanCount;
 use serde::Serialize;
 use std::io::Write;
 use std::path::Path;
@@ -50,8 +50,8 @@ pub fn run(args: &RemovePointsArgs) -> anyhow::Result<ExitCode> {
     }
     let would = if args.replay.dry_run { "would be " } else { "" };
     let PointsRemoved { mapped, points_removed, .. } = removed;
-    let (points, scans) = (HumanCount(points_removed), HumanCount(mapped.scans_changed));
-    writeln!(out, "removed   {points} points of {scans} scans {would}removed")?;
+    let (points, scans) = (Counted(points_removed, "point"), Counted(mapped.scans_changed, "scan"));
+    writeln!(out, "removed   {points} of {scans} {would}removed")?;
     replay::print(&mapped, args.replay.dry_run, &mut out)?;
     Ok(ExitCode::SUCCESS)
 }

@@ -1,9 +1,9 @@
 use crate::args::RemoveScansArgs;
+use crate::counted::Counted;
 use crate::json;
 use crate::quiet::summary_out;
 use crate::replay::{self, Job};
 use crate::run::print_message;
-use indicatif::HumanCount;
 use serde::Serialize;
 use std::io::Write;
 use std::path::Path;
@@ -63,10 +63,10 @@ pub fn run(args: &RemoveScansArgs) -> anyhow::Result<ExitCode> {
         return Ok(code);
     }
     let would = if args.replay.dry_run { "would be " } else { "" };
-    writeln!(out, "removed   {} scans {would}removed", HumanCount(removed.scans_removed))?;
+    writeln!(out, "removed   {} {would}removed", Counted(removed.scans_removed, "scan"))?;
     if removed.files_removed > 0 {
-        let files = HumanCount(removed.files_removed);
-        writeln!(out, "completed an earlier removal: deleted {files} files with removed scans")?;
+        let files = Counted(removed.files_removed, "file");
+        writeln!(out, "completed an earlier removal: deleted {files} with removed scans")?;
     }
     if removed.scans_removed > 0 {
         replay::print(&removed.mapped, args.replay.dry_run, &mut out)?;

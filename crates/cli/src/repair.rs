@@ -1,4 +1,5 @@
 use crate::args::RepairArgs;
+use crate::counted::Counted;
 use crate::json;
 use crate::progress::Progress;
 use indicatif::HumanCount;
@@ -40,14 +41,14 @@ pub fn run(args: &RepairArgs) -> anyhow::Result<ExitCode> {
     if args.json {
         json::print(&Report { map: &args.map, repair, done }, &mut out)?;
     } else if repair.actions == 0 {
-        writeln!(out, "nothing to repair in {} tiles", HumanCount(repair.tiles))?;
+        writeln!(out, "nothing to repair in {}", Counted(repair.tiles, "tile"))?;
     } else {
-        let (tiles, lost) = (HumanCount(repair.tiles), HumanCount(repair.tiles_lost));
-        writeln!(out, "repaired: the map has {tiles} tiles; {lost} were lost and their space is unknown")?;
+        let (tiles, lost) = (Counted(repair.tiles, "tile"), HumanCount(repair.tiles_lost));
+        writeln!(out, "repaired: the map has {tiles}; lost tiles: {lost}, their space is unknown")?;
         if repair.snapshots_lost + repair.snapshot_tiles_lost > 0 {
             let (snapshots, tiles) =
-                (HumanCount(repair.snapshots_lost), HumanCount(repair.snapshot_tiles_lost));
-            writeln!(out, "snapshots: {snapshots} were lost; others lost {tiles} tiles")?;
+                (HumanCount(repair.snapshots_lost), Counted(repair.snapshot_tiles_lost, "tile"));
+            writeln!(out, "snapshots: {snapshots} lost; others lost {tiles}")?;
         }
         if repair.scans_lost + repair.snapshot_scans_lost > 0 {
             let (scans, of_snapshots) =
@@ -66,10 +67,10 @@ pub fn run(args: &RepairArgs) -> anyhow::Result<ExitCode> {
             )?;
         }
         if repair.left > 0 {
-            let left = HumanCount(repair.left);
+            let left = Counted(repair.left, "tile");
             writeln!(
                 out,
-                "still damaged: {left} tiles, because the disk reports errors; copy the map to another disk"
+                "still damaged: {left}, because the disk reports errors; copy the map to another disk"
             )?;
         }
     }

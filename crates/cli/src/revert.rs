@@ -1,4 +1,5 @@
 use crate::args::RevertArgs;
+use crate::counted::Counted;
 use crate::json;
 use crate::progress::Progress;
 use crate::quiet::summary_out;
@@ -41,7 +42,7 @@ pub fn run(args: &RevertArgs) -> anyhow::Result<ExitCode> {
         writeln!(out, "reverted  nothing: the map already equals {}, scan {scan_number}", args.name)?;
         return Ok(ExitCode::SUCCESS);
     }
-    writeln!(out, "reverted  to {}: scan {scan_number}, {} tiles", args.name, HumanCount(tiles))?;
+    writeln!(out, "reverted  to {}: scan {scan_number}, {}", args.name, Counted(tiles, "tile"))?;
     writeln!(out, "tiles     {restored} restored, {removed} removed")?;
     match keep_as {
         Some(name) => writeln!(out, "before    scan {scan_number_before}; kept as {name}")?,

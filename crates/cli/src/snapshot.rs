@@ -1,4 +1,5 @@
 use crate::args::SnapshotArgs;
+use crate::counted::Counted;
 use crate::json;
 use crate::quiet::summary_out;
 use std::io::Write;
@@ -29,7 +30,8 @@ pub fn run(args: &SnapshotArgs) -> anyhow::Result<ExitCode> {
         writeln!(out, "kept      {}", args.name)?;
     } else if let Some(SnapshotInfo { name, flush_number, scan_number, tiles, .. }) = info {
         let before = if was_there { "; already existed" } else { "" };
-        writeln!(out, "kept      {name}: flush {flush_number}, scan {scan_number}, {tiles} tiles{before}")?;
+        let tiles = Counted(tiles, "tile");
+        writeln!(out, "kept      {name}: flush {flush_number}, scan {scan_number}, {tiles}{before}")?;
     }
     Ok(ExitCode::SUCCESS)
 }

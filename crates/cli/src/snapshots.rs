@@ -1,6 +1,7 @@
 use crate::args::SnapshotsArgs;
+use crate::counted::Counted;
 use crate::json;
-use indicatif::{HumanBytes, HumanCount};
+use indicatif::HumanBytes;
 use std::io::Write;
 use std::process::ExitCode;
 use voxtile::operations::{SnapshotInfo, snapshots};
@@ -31,9 +32,6 @@ fn print(info: &SnapshotInfo, width: usize, out: &mut impl Write) -> std::io::Re
     if let Some(damage) = damage {
         return writeln!(out, "{name:width$}  {damage}");
     }
-    let (tiles, own) = (HumanCount(*tiles), HumanBytes(*own_bytes));
-    writeln!(
-        out,
-        "{name:width$}  flush {flush_number}, scan {scan_number}, {tiles} tiles, {own} used only by it"
-    )
+    let (tiles, own) = (Counted(*tiles, "tile"), HumanBytes(*own_bytes));
+    writeln!(out, "{name:width$}  flush {flush_number}, scan {scan_number}, {tiles}, {own} used only by it")
 }

@@ -1,3 +1,4 @@
+use crate::counted::Counted;
 use crate::json;
 use crate::option_names::with_options;
 use crate::quiet::summary_out;
@@ -28,7 +29,7 @@ pub fn print(mut summary: Summary, json: bool) -> anyhow::Result<()> {
         summary.seconds
     )?;
     if summary.resumed_after > 0 {
-        writeln!(out, "resumed   after {} scans", HumanCount(summary.resumed_after))?;
+        writeln!(out, "resumed   after {}", Counted(summary.resumed_after, "scan"))?;
     }
     if let Some(poses) = &summary.poses {
         writeln!(out, "poses     {poses}")?;
@@ -37,7 +38,7 @@ pub fn print(mut summary: Summary, json: bool) -> anyhow::Result<()> {
         writeln!(out, "region    {}", region_tiles::text(tiles, &summary.grid))?;
     }
     if !summary.unread.is_empty() {
-        writeln!(out, "unread    {} scans, skipped", HumanCount(summary.unread.len() as u64))?;
+        writeln!(out, "unread    {}, skipped", Counted(summary.unread.len() as u64, "scan"))?;
         summary.unread.iter().try_for_each(|scan| writeln!(out, "          {scan}"))?;
     }
     if summary.left_out > 0 {

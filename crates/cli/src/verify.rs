@@ -1,7 +1,8 @@
 use crate::args::VerifyArgs;
+use crate::counted::Counted;
 use crate::json;
 use crate::progress::Progress;
-use indicatif::{HumanBytes, HumanCount};
+use indicatif::HumanBytes;
 use serde::Serialize;
 use std::io::Write;
 use std::process::ExitCode;
@@ -71,36 +72,33 @@ fn print(args: &VerifyArgs, verification: &Verification, out: &mut impl Write) -
     } = verification;
     writeln!(
         out,
-        "{} tiles, {} voxels, {} of tables; flush {flush_number}, scan {scan_number}",
-        HumanCount(*tiles),
-        HumanCount(*voxels),
+        "{}, {}, {} of tables; flush {flush_number}, scan {scan_number}",
+        Counted(*tiles, "tile"),
+        Counted(*voxels, "voxel"),
         HumanBytes(*table_bytes)
     )?;
     if *snapshots > 0 {
-        writeln!(out, "{} snapshots", HumanCount(*snapshots))?;
+        writeln!(out, "{}", Counted(*snapshots, "snapshot"))?;
     }
     if *leftovers > 0 {
-        let (leftovers, map) = (HumanCount(*leftovers), args.map.display());
+        let (leftovers, map) = (Counted(*leftovers, "file"), args.map.display());
         writeln!(
             out,
-            "leftovers: {leftovers} files, named above, must still be removed or renamed. The \
+            "leftovers: {leftovers}, named above, must still be removed or renamed. The \
              next process that opens the map for writing completes this, and so does `voxtile repair {map}`."
         )?;
     }
     match (damage, verified) {
         (0, _) if *unsettled > 0 => writeln!(
             out,
-            "undecided: {} possible faults, because the map kept changing; run verify while no process writes",
-            HumanCount(*unsettled)
+            "undecided: {}, because the map kept changing; run verify while no process writes",
+            Counted(*unsettled, "possible fault")
         ),
         (0, true) => writeln!(out, "intact: all checksums match"),
         (0, false) => writeln!(out, "unverified: the map has no checksums; its tables are well-formed"),
         (damage, _) => {
-            let map = args.map.display();
-            writeln!(
-                out,
-                "damaged: {damage} findings; restore files from a backup, or run `voxtile repair {map}`"
-            )
+            let (findings, map) = (Counted(*damage, "finding"), args.map.display());
+            writeln!(out, "damaged: {findings}; restore files from a backup, or run `voxtile repair {map}`")
         }
     }
 }

@@ -154,7 +154,7 @@ impl Registry {
             (Some((one, _, count)), Some((other, _, others))) => {
                 let (one, other) = (one.name, other.name);
                 let reason = format!(
-                    "contains {count} files of format {one} and {others} of format {other}; select one with `format`"
+                    "contains files of format {one} ({count}) and of format {other} ({others}); select one with `format`"
                 );
                 Err(argument(path, reason))
             }

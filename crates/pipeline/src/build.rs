@@ -139,7 +139,8 @@ pub fn build(options: &BuildOptions, watch: &Watch) -> anyhow::Result<Option<Sum
     }
     if let Err(error) = outcome {
         let all = resumed_after + scans;
-        return Err(error.context(format!("after {all} scans, which are in the map")));
+        let mapped = if all == 1 { "1 scan".to_owned() } else { format!("{all} scans") };
+        return Err(error.context(format!("after {mapped}, already in the map")));
     }
     let interrupted = stop.is_set();
     let summary = Summary::of(&options.output, scans, report, mapper, started.elapsed())?;

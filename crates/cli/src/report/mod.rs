@@ -5,6 +5,7 @@ mod page;
 mod svg;
 
 use crate::args::ReportArgs;
+use crate::counted::Counted;
 use crate::info::Info;
 use crate::json;
 use crate::picture::{name_of, path_of};
@@ -83,7 +84,8 @@ pub fn run(args: &ReportArgs, is_quiet: bool) -> anyhow::Result<ExitCode> {
         json::print(&report.to_json(args), &mut { out })?;
     } else if !is_quiet {
         let damage = report.damage_count().filter(|&count| count > 0);
-        let damage = damage.map_or(String::new(), |count| format!("; the map is damaged, {count} findings"));
+        let damage = damage
+            .map_or(String::new(), |count| format!("; the map is damaged, {}", Counted(count, "finding")));
         writeln!(out, "{}: report on {}{damage}", args.output.display(), args.map.display())?;
     }
     Ok(ExitCode::SUCCESS)

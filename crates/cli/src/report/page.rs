@@ -1,6 +1,7 @@
 use super::html::Text;
 use super::svg::{Bar, histogram};
 use super::{Content, Damage, MAX_FINDINGS, Report, Sizes};
+use crate::counted::Counted;
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use indicatif::{HumanBytes, HumanCount};
@@ -53,7 +54,7 @@ impl Report {
                 (0, true) => writeln!(out, "<p class=\"good\">Intact: all checksums match.</p>"),
                 (0, false) => writeln!(out, "<p>Unverified: the map has no checksums.</p>"),
                 (count, _) => {
-                    writeln!(out, "<p class=\"bad\">Damaged: {} findings, see below.</p>", HumanCount(count))
+                    writeln!(out, "<p class=\"bad\">Damaged: {}, see below.</p>", Counted(count, "finding"))
                 }
             },
         }
@@ -167,10 +168,10 @@ impl Content {
         }
         end_table(out)?;
         if !survey.unread.is_empty() {
-            let count = survey.unread.len();
+            let tiles = Counted(survey.unread.len() as u64, "tile");
             writeln!(
                 out,
-                "<p class=\"bad\">{count} tiles cannot be read and are missing in pictures, columns and histograms.</p>"
+                "<p class=\"bad\">{tiles} cannot be read. Pictures, columns and histograms lack them.</p>"
             )?;
         }
         Ok(())

@@ -122,7 +122,7 @@ fn a_failure_prints_an_object_and_a_line() {
     let (code, error, printed) = failed(&["build", text(&scans), "-o", none, "--json"]);
     assert_eq!((code, &error["kind"], &error["path"]), (1, &"malformed".into(), &text(&scan).into()));
     assert_eq!(error["line"], 10);
-    assert!(printed.contains("after 1 scans") && printed.contains("malformed: line 10: "), "{printed}");
+    assert!(printed.contains("after 1 scan,") && printed.contains("malformed: line 10: "), "{printed}");
     assert_eq!(printed.matches("line 10").count(), 1, "{printed}");
 
     // Without --json standard output is empty; also for an invalid command line.

@@ -114,8 +114,8 @@ fn impossible_pictures_are_refused() {
         "{printed}"
     );
     let page = fs::read_to_string(&page).unwrap();
-    assert!(page.contains("Damaged: 1 findings") && page.contains("iwlo_meta.bin"), "{page}");
-    assert!(page.contains("1 tiles cannot be read"));
+    assert!(page.contains("Damaged: 1 finding,") && page.contains("iwlo_meta.bin"), "{page}");
+    assert!(page.contains("1 tile cannot be read"));
 }
 
 #[test]

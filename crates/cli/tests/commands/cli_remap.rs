@@ -80,7 +80,7 @@ fn a_remapped_map_equals_a_build_with_the_new_poses() {
     let own = kept.poses("own.txt", 0.0);
     let reported = output(&["remap", &kept.map, "--poses", &own, "--tolerance", "0.4m,1deg"]);
     assert!(
-        reported.contains("1 scans moved, by up to 0.600 m") && reported.contains("1 scans unchanged"),
+        reported.contains("1 scan moved, by up to 0.600 m") && reported.contains("1 scan unchanged"),
         "{reported}"
     );
     output(&["remap", &kept.map, "--poses", &own]);

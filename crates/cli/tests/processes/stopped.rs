@@ -31,7 +31,7 @@ fn a_signal_ends_a_build_with_all_its_scans_in_the_map() {
             assert_eq!(message.lines().count(), 2, "{message}");
             assert!(message.contains("a second Ctrl-C or SIGTERM"), "{message}");
             let (number, seen) = digest(&map).unwrap_or((0, scans.digests[0].clone()));
-            let is_told = message.contains(&format!("stopped after {number} scans"))
+            let is_told = message.contains(&format!("stopped after {number} scan"))
                 || (message.contains("stopped before the first scan"));
             assert!(is_told, "{message}");
             assert_eq!(seen, scans.digests[number]);

@@ -48,7 +48,7 @@ fn folder_formats_are_detected() {
     assert_eq!(guess(folder.path()).unwrap(), "bin");
     fs::copy(fixture("ascii.ply"), at("1.ply")).unwrap();
     let error = format!("{:#}", guess(folder.path()).unwrap_err());
-    assert!(error.contains("contains 1 files of format bin and 1 of format ply"), "{error}");
+    assert!(error.contains("contains files of format bin (1) and of format ply (1)"), "{error}");
     fs::write(at("depth.txt"), "").unwrap();
     assert_eq!(guess(folder.path()).unwrap(), "tum-rgbd");
     fs::write(at("metadata.yaml"), "rosbag2_bagfile_information:\n").unwrap();
