@@ -7,7 +7,7 @@ use voxtile::space::{TileIndex, VoxelIndex};
 
 /// Largest number of tiles in a range for which each tile gets its own digest.
 const MAX_SINGLE_TILES: usize = 1024;
-/// Number of digests for a range with more tiles.
+/// Number of digests for a range with more than [`MAX_SINGLE_TILES`] tiles.
 const GROUPS: usize = 64;
 /// Number of digested tiles that costs as much as one byte of an answer: a short answer may cover many tiles.
 const TILES_PER_BYTE: usize = 4;

@@ -28,7 +28,7 @@ struct Outstanding {
 
 /// Maximum number of ranges in one request for voxels.
 const RANGES_PER_REQUEST: usize = 20;
-/// Number of answers after which the next request is sent: the default limit per request of a sender.
+/// Number of answers after which the next request is sent: the default of a sender's packets per answer.
 const PACKETS_PER_REQUEST: usize = 16;
 
 impl AntiEntropy {
@@ -39,7 +39,7 @@ impl AntiEntropy {
         self.digests.is_empty() && self.content.is_empty()
     }
 
-    /// Starts with the whole set.
+    /// Starts again with the whole set.
     pub(super) fn begin(&mut self, layer: &VoxelSet) {
         *self = Self::default();
         if layer.is_empty() { &mut self.content } else { &mut self.digests }.put(SetRange::ALL);
@@ -82,7 +82,7 @@ impl AntiEntropy {
         empty
     }
 
-    /// Adds a range whose voxels are requested.
+    /// Adds a range of voxels to request.
     pub(super) fn request_content(&mut self, range: SetRange) {
         self.content.put(range);
     }
@@ -136,7 +136,7 @@ impl AntiEntropy {
     }
 }
 
-/// Largest number of voxels whose content costs no more than further digests.
+/// Largest number of voxels for which their content costs no more than further digests.
 const FEW_VOXELS: u64 = 256;
 
 fn is_single(layer: &VoxelSet, range: SetRange) -> bool {

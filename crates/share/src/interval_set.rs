@@ -126,7 +126,7 @@ mod tests {
     fn the_number_of_ranges_is_limited_and_no_position_is_lost() {
         let mut ranges = IntervalSet::default();
         ranges.put(range(0, 1 << 40));
-        // Removing every second position needs far more ranges than the limit.
+        // Without the limit, there would be three times as many ranges after these removals.
         (0..3 * MAX_RANGES as u64).for_each(|k| {
             assert!(ranges.remove(range(2 * k, 2 * k)));
         });

@@ -64,8 +64,7 @@ pub fn read_layer(input: &mut impl Read, max_voxels: u64) -> Result<VoxelSet, De
     read_layer_within(input, max_voxels, usize::MAX)
 }
 
-/// Reads a layer with a memory limit in bytes, like [`read_layer`]. The limit may be exceeded by the size of one
-/// packet.
+/// Reads a layer like [`read_layer`], with a memory limit in bytes. One packet may exceed the limit.
 ///
 /// # Errors
 ///

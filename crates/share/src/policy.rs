@@ -6,7 +6,7 @@ pub enum ExportPolicy {
     /// Voxels that changed since the last frame. Needs the fewest bytes.
     #[default]
     LastFrame,
-    /// Voxels that changed in the last frames, at least 1. For links without a back channel.
+    /// Voxels that changed in the last N frames, with N at least 1. For links without a back channel.
     Ring(usize),
     /// The whole set in every frame.
     Everything,

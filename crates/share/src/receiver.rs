@@ -217,7 +217,7 @@ impl Receiver {
         let Some(layer) = &mut self.layer else { return };
         let mut work = Work::of_a_packet();
         for range in self.anti_entropy.take_digests(first, entries, layer, now) {
-            // Request the range until it is done: its removal may exceed the work limit.
+            // Keep requesting the range until it is done: the removal may exceed the work limit.
             self.anti_entropy.request_content(range);
             self.take_content(as_of, range, &Content::default(), &mut work, now);
         }

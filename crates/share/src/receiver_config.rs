@@ -67,7 +67,7 @@ pub struct ReceiverCounts {
     pub refused_grids: u64,
     /// Requests sent.
     pub asks: u64,
-    /// Bytes of these requests.
+    /// Bytes of the requests sent.
     pub ask_bytes: u64,
     /// Number of times that anti-entropy was started.
     pub catch_ups: u64,

@@ -21,7 +21,7 @@ struct Ends<'a> {
     grid: &'a Grid,
     origin: Point,
     start: VoxelIndex,
-    /// Maximum length in metres of a ray with a return, and of a ray without.
+    /// Maximum length in metres of a ray with a return, and of a ray without a return.
     cuts_m: [f64; 2],
 }
 

@@ -96,7 +96,7 @@ impl Sender {
         self.counts
     }
 
-    /// The set as sent: the layer of a receiver that has every packet.
+    /// Returns the set as sent: the layer of a receiver that has every packet.
     pub fn sent(&mut self) -> &mut VoxelSet {
         &mut self.sent
     }

@@ -17,7 +17,7 @@ const TILE_NODE: usize = node_bytes::<TileIndex, TileVoxels>();
 const ENTRIES: usize = 5;
 
 impl VoxelSet {
-    /// Maximum memory of a voxel, in bytes: the voxel is alone in its tile.
+    /// Maximum memory per voxel, in bytes: the case of a voxel alone in its tile.
     pub(super) const MAX_BYTES_PER_VOXEL: usize =
         TILE_NODE.div_ceil(ENTRIES) + BRICK_NODE + BRICK_NODE / ENTRIES;
 

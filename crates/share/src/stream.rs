@@ -21,7 +21,7 @@ struct Missing {
     requests: u32,
 }
 
-/// Maximum distance of a packet number from the last one. Beyond it, the receiver requests a status.
+/// Maximum distance of a packet number from the highest known number. Beyond it, the receiver requests a status.
 pub(super) const WINDOW: u64 = 4096;
 
 /// Upper bound on the memory of missing packets, in bytes: a B-tree node has space for 11 packets and holds at least

@@ -4,7 +4,7 @@ use std::time::Duration;
 /// tokens in the bucket; the next answer then waits until the deficit is refilled.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct TokenBucket {
-    /// In bytes times nanoseconds, because requests may arrive in less time than the refill of a byte takes. Negative
+    /// In bytes times nanoseconds: the time between requests may be shorter than the refill time of one byte. Negative
     /// after an answer that exceeded the tokens.
     tokens: i128,
     at: Duration,

@@ -25,7 +25,7 @@ pub(super) struct VoxelVersions {
 
 /// Maximum number of voxel versions: a minute of a dense lidar.
 const MAX_VOXELS: usize = 1 << 18;
-/// Minimum number of voxel versions, enough for a usual packet.
+/// Minimum number of voxel versions, enough for a typical packet.
 const MIN_VOXELS: usize = 1 << 12;
 /// Maximum number of range versions.
 const MAX_PARTS: usize = 4096;

@@ -10,7 +10,7 @@ use voxtile::space::{BrickMask, Grid, TileIndex, VoxelIndex};
 use voxtile::{Error, Result};
 use voxtile_local::{LocalMap, LocalReport, LocalState, LocalView};
 
-/// Passes an archive's occupied voxels to a sender: the voxels of at least a threshold probability.
+/// Passes an archive's occupied voxels to a sender: voxels with at least a threshold probability.
 #[derive(Clone, Copy, Debug)]
 pub struct MapWatch {
     threshold_log_odds: f64,

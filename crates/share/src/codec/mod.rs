@@ -1,12 +1,12 @@
-//! Encoding and decoding of packets. A packet needs no state of other packets.
+//! Encoding and decoding of packets. A packet is independent of other packets.
 //!
 //! ```text
 //! updates -> octree, level by level -> bits with their contexts -> arithmetic coder -> bytes
 //!            voxel_tree                context, prior              bit_coder          packet, request
 //! ```
 //!
-//! Since each packet can be decoded by itself, a lost packet costs only its own content. Input is untrusted: no number
-//! in a packet sets the size of an allocation, and the number of voxels is limited.
+//! A lost packet costs only its own content. Input is untrusted: no number in a packet sets the size of an allocation,
+//! and the number of voxels is limited.
 
 mod bit_coder;
 mod bytes;

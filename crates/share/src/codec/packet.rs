@@ -7,7 +7,7 @@ use voxtile::{FormatError, Result};
 /// Version of the format: the first byte of every packet and request. Other versions are refused.
 pub const VERSION: u8 = 1;
 
-/// A packet of a sender.
+/// A packet from a sender to receivers.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Packet {
     /// Voxels that were added to or removed from the set.
@@ -21,7 +21,7 @@ pub enum Packet {
     },
     /// All voxels in a range of the set.
     Content {
-        /// As of which packet.
+        /// Epoch, and the last packet of changes that is included.
         header: Header,
         /// The range.
         range: SetRange,
@@ -30,7 +30,7 @@ pub enum Packet {
     },
     /// Digests of consecutive tiles.
     Digests {
-        /// As of which packet.
+        /// Epoch, and the last packet of changes that is included.
         header: Header,
         /// First tile of the first entry.
         first: TileIndex,
@@ -44,7 +44,7 @@ pub enum Packet {
 /// Epoch of the sender and a packet number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Header {
-    /// Number that differs for each start of the sender.
+    /// Epoch of the sender, which differs for each start.
     pub epoch: u32,
     /// For changes, the number of the packet, from 1. For other packets, the number of the last packet of changes.
     pub sequence: u64,
@@ -64,7 +64,7 @@ pub struct DigestEntry {
 /// The status of a sender.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Status {
-    /// As of which packet.
+    /// Epoch, and the last packet of changes that is included.
     pub header: Header,
     /// Nonce of the request; 0 without a request.
     pub nonce: u64,
@@ -190,7 +190,7 @@ fn put_header(bytes: &mut Vec<u8>, kind: u8, header: Header) {
     put_number(bytes, header.sequence);
 }
 
-/// Writes a tile as the difference from another one.
+/// Writes a tile index as the difference from another index.
 fn put_tile(bytes: &mut Vec<u8>, before: TileIndex, tile: TileIndex) {
     for (before, k) in before.to_array().into_iter().zip(tile.to_array()) {
         put_signed(bytes, i64::from(k) - i64::from(before));
@@ -211,7 +211,7 @@ pub(super) fn put_range(bytes: &mut Vec<u8>, range: SetRange) {
     put_tile(bytes, TileIndex::default(), range.first.tile);
     put_number(bytes, range.first.code);
     put_tile(bytes, range.first.tile, range.last.tile);
-    // A range often ends with its last tile, which gives a 0.
+    // Ranges often end at the last code of a tile, which is stored as 0.
     put_number(bytes, super::super::set_range::LAST_CODE - range.last.code);
 }
 

@@ -34,7 +34,7 @@ const MIXED: u8 = 3;
 ///
 /// # Errors
 ///
-/// More than [`MAX_VOXELS_PER_PACKET`] voxels, voxels about a million or more voxels apart, or an index above
+/// More than [`MAX_VOXELS_PER_PACKET`] voxels, voxels that are about a million voxels apart or more, or an index above
 /// [`LAST_VOXEL_INDEX`].
 pub fn encode_updates(updates: &[Update]) -> Result<Vec<u8>> {
     if updates.is_empty() {
@@ -48,7 +48,7 @@ pub fn encode_updates(updates: &[Update]) -> Result<Vec<u8>> {
         _ => MIXED,
     };
     let mut bytes = vec![mode << 5 | cube.levels as u8];
-    // The lower corner is the corner of a brick: a multiple of 8.
+    // The origin is the corner of a brick, so its coordinates are multiples of 8.
     cube.origin.iter().for_each(|k| put_signed(&mut bytes, i64::from(k >> 3)));
     let mut writer = BitWriter::new();
     let walked = walk(&mut writer, cube.levels, mode == MIXED, &cube.voxels);
