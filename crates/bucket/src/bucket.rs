@@ -68,7 +68,7 @@ const TIMEOUTS_S: std::ops::RangeInclusive<f64> = 0.1..=86_400.0;
 const UNCOUNTED_BYTES: u64 = 1 << 20;
 
 /// Remedy for a lost or damaged object, for messages.
-pub(super) const SEND_AGAIN: &str = "send the whole map again with `voxtile push --resend`";
+pub(super) const RESEND_HINT: &str = "send the whole map again with `voxtile push --resend`";
 
 /// Maximum size of a manifest or page, in bytes.
 const MAX_LIST_BYTES: u64 = 1 << 28;
@@ -486,7 +486,7 @@ pub(super) fn missing_object(error: io::Error) -> io::Error {
         return error;
     }
     let reason = format!(
-        "{error}; if another push used --prune, open the map again; otherwise {SEND_AGAIN} from its folder"
+        "{error}; if another push used --prune, open the map again; otherwise {RESEND_HINT} from its folder"
     );
     io::Error::other(reason)
 }

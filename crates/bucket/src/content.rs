@@ -1,4 +1,4 @@
-use super::bucket::{SEND_AGAIN, error_text, object_error};
+use super::bucket::{RESEND_HINT, error_text, object_error};
 use super::object_name::ObjectName;
 use super::request::{Failure, Request};
 use bytes::Bytes;
@@ -9,7 +9,7 @@ use std::io;
 use std::ops::Range;
 
 /// Maximum number of downloads of an object whose content does not match its name: a proxy may have truncated it.
-const FETCHES: usize = 3;
+const MAX_FETCHES: usize = 3;
 
 /// Fetches a whole object and compares it with its name. After a broken connection, it continues at the byte reached:
 /// the name detects parts that do not belong together.
@@ -20,7 +20,7 @@ pub(super) async fn fetch_whole(
     name: ObjectName,
     max_bytes: u64,
 ) -> io::Result<Bytes> {
-    for _ in 0..FETCHES {
+    for _ in 0..MAX_FETCHES {
         let mut fetch = Fetch { max_bytes, ..Fetch::new(None) };
         fetch.run(request, store, key).await?;
         // Hashing on the network thread is short compared with the download.
@@ -28,7 +28,7 @@ pub(super) async fn fetch_whole(
             return Ok(fetch.content.into());
         }
     }
-    let reason = format!("object {key}: its content does not match its name; {SEND_AGAIN}");
+    let reason = format!("object {key}: its content does not match its name; {RESEND_HINT}");
     Err(io::Error::new(io::ErrorKind::InvalidData, reason))
 }
 

@@ -38,7 +38,7 @@ pub(super) async fn fetch_file(
             Err(failure) => request.retry_after(failure).await?,
         }
     }
-    fetch.out.flush().map_err(|error| on(to, error))
+    fetch.out.flush().map_err(|error| with_path(to, error))
 }
 
 /// Download of a file.
@@ -80,7 +80,7 @@ impl FileFetch<'_> {
                 let reason = format!("object {key}: the server sent more bytes than requested");
                 return Err(Failure::Fatal(io::Error::other(reason)));
             }
-            self.out.write_all(&chunk).map_err(|error| Failure::Fatal(on(self.to, error)))?;
+            self.out.write_all(&chunk).map_err(|error| Failure::Fatal(with_path(self.to, error)))?;
             self.bytes += chunk.len() as u64;
             self.request.add_bytes(chunk.len() as u64);
         }
@@ -124,9 +124,9 @@ impl StoredObject {
 }
 
 fn create(path: &Path) -> io::Result<Box<dyn DiskWrite>> {
-    FsDisk.create(path).map_err(|error| on(path, error))
+    FsDisk.create(path).map_err(|error| with_path(path, error))
 }
 
-fn on(path: &Path, error: io::Error) -> io::Error {
+fn with_path(path: &Path, error: io::Error) -> io::Error {
     io::Error::new(error.kind(), format!("{}: {error}", path.display()))
 }

@@ -19,12 +19,12 @@ pub(super) struct FileList {
 }
 
 /// Maximum number of cached pages, of a few hundred kilobytes each.
-const PAGES: NonZeroUsize = NonZeroUsize::new(64).unwrap();
+const MAX_PAGES: NonZeroUsize = NonZeroUsize::new(64).unwrap();
 
 impl FileList {
     pub(super) fn new(bucket: Bucket, manifest: Manifest) -> Self {
         let Manifest { files, pages, .. } = manifest;
-        Self { bucket, files, page_names: pages, pages: Mutex::new(LruCache::new(PAGES)) }
+        Self { bucket, files, page_names: pages, pages: Mutex::new(LruCache::new(MAX_PAGES)) }
     }
 
     /// Returns a file; `None` if the map has no file with this path.

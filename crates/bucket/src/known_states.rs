@@ -82,21 +82,21 @@ impl KnownStates {
     fn to_text(&self) -> String {
         let mut text = String::new();
         for KnownState { flush_number, name, was_in_bucket } in &self.0 {
-            let how = if *was_in_bucket { THERE } else { OFFERED };
+            let how = if *was_in_bucket { IN_BUCKET } else { OFFERED };
             let _ = writeln!(text, "{how} {flush_number} {name}");
         }
         text
     }
 }
 
-const THERE: &str = "there";
+const IN_BUCKET: &str = "there";
 const OFFERED: &str = "offered";
 
 impl KnownState {
     fn of_line(line: &str) -> Option<Self> {
         let mut words = line.split(' ');
         let was_in_bucket = match words.next()? {
-            THERE => true,
+            IN_BUCKET => true,
             OFFERED => false,
             _ => return None,
         };

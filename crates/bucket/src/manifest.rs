@@ -1,4 +1,4 @@
-use super::bucket::SEND_AGAIN;
+use super::bucket::RESEND_HINT;
 use super::object_name::ObjectName;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -92,7 +92,7 @@ impl Manifest {
         }
         let computed = manifest.computed_checksum().map_err(|error| error.to_string())?;
         if manifest.checksum.take() != Some(computed) {
-            return Err(format!("its checksum does not match; {SEND_AGAIN}"));
+            return Err(format!("its checksum does not match; {RESEND_HINT}"));
         }
         check_files(&manifest.files)?;
         Ok(manifest)

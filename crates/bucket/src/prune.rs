@@ -16,7 +16,7 @@ const MAX_IN_FLIGHT: usize = 16;
 /// older objects that are removed here, it has read an older manifest, so its own manifest is refused.
 pub(super) fn prune(bucket: &Bucket, manifest: Manifest) -> Result<u64> {
     let failed = |error: io::Error| Error::io(bucket.path(), "prune", error);
-    let named = named_by(bucket, &manifest).map_err(failed)?;
+    let named = objects_of(bucket, &manifest).map_err(failed)?;
     let found = bucket.objects_before_manifest().map_err(failed)?;
     // Prune only if the manifest in the bucket is still that of this push.
     let now = bucket.manifest()?.map(|found| found.manifest);
@@ -38,7 +38,7 @@ pub(super) fn prune(bucket: &Bucket, manifest: Manifest) -> Result<u64> {
 }
 
 /// Returns all objects that a manifest names.
-fn named_by(bucket: &Bucket, manifest: &Manifest) -> io::Result<FxHashSet<ObjectName>> {
+fn objects_of(bucket: &Bucket, manifest: &Manifest) -> io::Result<FxHashSet<ObjectName>> {
     let mut named: FxHashSet<_> = manifest.pages.values().copied().collect();
     let list = FileList::new(bucket.clone(), manifest.clone());
     named.extend(list.own_files().values().flat_map(|file| &file.parts));

@@ -64,7 +64,7 @@ pub fn pull(
     check_only_map_files(&disk, &unfinished)?;
     let pulled = Pulled { flush_number: manifest.flush_number, tiles: manifest.tiles, ..Pulled::default() };
     let all_bytes = manifest.bytes;
-    let known = known_with(bucket, &manifest, earlier.as_ref())?;
+    let known = known_states_with(bucket, &manifest, earlier.as_ref())?;
     let list = FileList::new(bucket.clone(), manifest);
     let mut pull = Pull {
         bucket,
@@ -178,7 +178,7 @@ fn check_was_in_bucket(
 }
 
 /// Returns the known states of the folder, including the state that is pulled.
-fn known_with(bucket: &Bucket, manifest: &Manifest, earlier: Option<&Earlier>) -> Result<KnownStates> {
+fn known_states_with(bucket: &Bucket, manifest: &Manifest, earlier: Option<&Earlier>) -> Result<KnownStates> {
     let mut known = earlier.map(|earlier| earlier.known.clone()).unwrap_or_default();
     known.add(manifest, name_of(bucket, manifest)?, true);
     Ok(known)

@@ -51,7 +51,7 @@ pub struct Pushed {
 }
 
 /// Maximum number of attempts if a writer flushes the map during the push. Uploaded objects are kept.
-const ATTEMPTS: usize = 20;
+const MAX_ATTEMPTS: usize = 20;
 
 /// Uploads the last flush of a map to a bucket, even while a writer is active. Only tiles that changed since the last
 /// push are uploaded, several at a time. The manifest is written last, so that readers of the bucket see complete
@@ -72,7 +72,7 @@ pub fn push(
     let map = map.into();
     let mut push = Push::begin(bucket, &map, options)?;
     let mut manifest = push.send_map(&map, &mut progress);
-    for _ in 1..ATTEMPTS {
+    for _ in 1..MAX_ATTEMPTS {
         if !matches!(manifest, Err(Error::Changed { .. })) {
             break;
         }
@@ -162,7 +162,7 @@ impl<'a> Push<'a> {
             manifest.pages.insert(name, object);
         }
         self.sender.set_tile(None);
-        let files = store.committed_files(&snapshots).map_err(|error| unless_changed(&store, error))?;
+        let files = store.committed_files(&snapshots).map_err(|error| kept_scans_error(&store, error))?;
         for file in files {
             let path = file.path.clone();
             let stored = self.send_file(&store, file, None)?;
@@ -198,7 +198,7 @@ impl<'a> Push<'a> {
         // An interrupted push may have written this same manifest: `check_is_same_or_later` compares it once all files
         // are known.
         let may_be_same = before.flush_number == manifest.flush_number;
-        if self.builds_on(before)? || may_be_same { Ok(()) } else { Err(self.diverged(before, folder)) }
+        if self.builds_on(before)? || may_be_same { Ok(()) } else { Err(self.diverged_error(before, folder)) }
     }
 
     /// Refuses two different states of the same flush: one of the copies has diverged.
@@ -210,7 +210,7 @@ impl<'a> Push<'a> {
                     && !(self.known.is_some() && self.builds_on(before)?)
                     && !self.replaces =>
             {
-                Err(self.diverged(before, folder))
+                Err(self.diverged_error(before, folder))
             }
             _ => Ok(()),
         }
@@ -223,7 +223,7 @@ impl<'a> Push<'a> {
         Ok(self.replaces || known.contains(self.name_of(before)?))
     }
 
-    fn diverged(&self, before: &Manifest, folder: &Path) -> Error {
+    fn diverged_error(&self, before: &Manifest, folder: &Path) -> Error {
         let wanted = format!(
             "one that {} builds on: another copy of the map was changed and pushed. Pull that state into a \
              new folder and `voxtile merge` both, or discard it with --replace",
@@ -340,12 +340,12 @@ impl<'a> Push<'a> {
                 return Ok(stored);
             }
         }
-        Err(not_found(store, &path, tile))
+        Err(missing_file_error(store, &path, tile))
     }
 }
 
 /// Returns the error for a file that is missing or does not match the log: a flush in the meantime, or damage.
-fn not_found(store: &TileStore, path: &str, tile: Option<TileIndex>) -> Error {
+fn missing_file_error(store: &TileStore, path: &str, tile: Option<TileIndex>) -> Error {
     let folder = store.folder();
     let now = TileStore::open_read_only(store.disk().clone(), folder);
     if now.is_ok_and(|now| now.commits().flush_number == store.commits().flush_number) {
@@ -356,7 +356,7 @@ fn not_found(store: &TileStore, path: &str, tile: Option<TileIndex>) -> Error {
 }
 
 /// Returns the error for kept scans that cannot be uploaded: a flush in the meantime, or damage.
-fn unless_changed(store: &TileStore, error: Error) -> Error {
+fn kept_scans_error(store: &TileStore, error: Error) -> Error {
     let Error::Damaged { path, tile, mut cause } = error else { return error };
     let now = TileStore::open_read_only(store.disk().clone(), store.folder());
     if now.is_ok_and(|now| now.commits().flush_number != store.commits().flush_number) {

@@ -10,7 +10,7 @@ use voxtile::{Error, Result};
 
 /// Timeout of a whole request with its content. `Request` ends requests without progress earlier; a request with
 /// progress may take long, such as the download of a whole file.
-const WHOLE: &str = "1 day";
+const REQUEST_TIMEOUT: &str = "1 day";
 
 /// Returns the store of a URL, by its scheme and root; `None` for an unknown scheme.
 ///
@@ -44,7 +44,7 @@ fn amazon(root: &str) -> AmazonS3Builder {
         .with_retry(no_retries())
         .with_http_connector(CountingConnector);
     if !is_set("AWS_TIMEOUT") {
-        builder = builder.with_config(AmazonS3ConfigKey::Client(ClientConfigKey::Timeout), WHOLE);
+        builder = builder.with_config(AmazonS3ConfigKey::Client(ClientConfigKey::Timeout), REQUEST_TIMEOUT);
     }
     match endpoint {
         Some(endpoint) => {
@@ -62,7 +62,7 @@ fn google(root: &str) -> GoogleCloudStorageBuilder {
     if is_set("GOOGLE_TIMEOUT") {
         return builder;
     }
-    builder.with_config(GoogleConfigKey::Client(ClientConfigKey::Timeout), WHOLE)
+    builder.with_config(GoogleConfigKey::Client(ClientConfigKey::Timeout), REQUEST_TIMEOUT)
 }
 
 fn azure(root: &str) -> MicrosoftAzureBuilder {
@@ -71,14 +71,14 @@ fn azure(root: &str) -> MicrosoftAzureBuilder {
     if is_set("AZURE_TIMEOUT") {
         return builder;
     }
-    builder.with_config(AzureConfigKey::Client(ClientConfigKey::Timeout), WHOLE)
+    builder.with_config(AzureConfigKey::Client(ClientConfigKey::Timeout), REQUEST_TIMEOUT)
 }
 
 fn web(root: &str, is_plain: bool) -> HttpBuilder {
     let builder = HttpBuilder::new().with_url(root).with_retry(no_retries());
     let builder = builder.with_http_connector(CountingConnector);
     let builder = builder.with_config(ClientConfigKey::AllowHttp, is_plain.to_string());
-    builder.with_config(ClientConfigKey::Timeout, WHOLE)
+    builder.with_config(ClientConfigKey::Timeout, REQUEST_TIMEOUT)
 }
 
 /// Disables the retries of the client: `Request` retries, keeps the bytes received, and has the timeout.

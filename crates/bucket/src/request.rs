@@ -38,7 +38,7 @@ struct State {
     /// Bytes of the object received so far, or sent by this attempt.
     moved: u64,
     /// Maximum of `moved` over all attempts, in steps of [`PROGRESS_BYTES`].
-    farthest: u64,
+    max_moved: u64,
     /// `moved` and the time at the last progress or at the start of this attempt.
     last_progress: (u64, Instant),
     /// Idle time of earlier attempts and the pauses between them since the last progress.
@@ -75,7 +75,7 @@ const MAX_STALLED: u32 = 20;
 const MAX_UNREACHABLE: u32 = 4;
 
 const FIRST_PAUSE: Duration = Duration::from_millis(50);
-const LONGEST_PAUSE: Duration = Duration::from_secs(5);
+const MAX_PAUSE: Duration = Duration::from_secs(5);
 
 /// Time after which a wait is reported, or a quarter of the limit if that is less.
 const FIRST_REPORT: Duration = Duration::from_secs(8);
@@ -98,7 +98,7 @@ impl Request {
             attempts: 0,
             stalled: 0,
             moved: 0,
-            farthest: 0,
+            max_moved: 0,
             last_progress: (0, now),
             idle: Duration::ZERO,
             address: None,
@@ -188,7 +188,7 @@ impl Request {
                 false => MAX_STALLED,
             };
             let doublings = state.stalled.saturating_sub(1).min(16);
-            let pause = FIRST_PAUSE.saturating_mul(1 << doublings).min(LONGEST_PAUSE);
+            let pause = FIRST_PAUSE.saturating_mul(1 << doublings).min(MAX_PAUSE);
             state.idle += pause;
             let is_over = state.idle >= self.limit;
             state.last_failure = Some(reason.clone());
@@ -207,8 +207,8 @@ impl Request {
         if state.moved >= state.last_progress.0 + PROGRESS_BYTES {
             state.last_progress = (state.moved, Instant::now());
         }
-        if state.moved >= state.farthest + PROGRESS_BYTES {
-            (state.farthest, state.idle, state.stalled) = (state.moved, Duration::ZERO, 0);
+        if state.moved >= state.max_moved + PROGRESS_BYTES {
+            (state.max_moved, state.idle, state.stalled) = (state.moved, Duration::ZERO, 0);
         }
     }
 

@@ -22,14 +22,14 @@ impl LayerLimits {
     pub(super) fn put(&self, layer: &mut VoxelSet, voxel: VoxelIndex, is_in: bool) -> bool {
         let is_inside = || self.region.as_ref().is_none_or(|region| region.contains(voxel));
         let is_allowed =
-            !is_in || (is_inside() && (self.has_room_for(layer, voxel) || layer.contains(voxel)));
+            !is_in || (is_inside() && (self.has_space_for(layer, voxel) || layer.contains(voxel)));
         if is_allowed {
             layer.put(voxel, is_in);
         }
         is_allowed
     }
 
-    fn has_room_for(&self, layer: &VoxelSet, voxel: VoxelIndex) -> bool {
+    fn has_space_for(&self, layer: &VoxelSet, voxel: VoxelIndex) -> bool {
         let tile = layer.grid().tile_of_voxel(voxel);
         layer.len() < self.max_voxels
             && layer.memory_bytes() + VoxelSet::MAX_BYTES_PER_VOXEL <= self.bytes

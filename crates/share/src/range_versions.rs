@@ -46,7 +46,7 @@ impl RangeVersions {
     }
 
     /// Sets the version of a range, except where it already has a later version.
-    pub(super) fn note(&mut self, range: SetRange, as_of: u64) {
+    pub(super) fn record(&mut self, range: SetRange, as_of: u64) {
         let gaps = self.gaps(range, as_of);
         let older: Vec<(SetRange, u64)> =
             self.overlapping(range).filter(|(_, version)| *version < as_of).collect();
@@ -129,7 +129,7 @@ mod tests {
                 for (k, wanted) in (ends[0]..=ends[1]).zip(wanted) {
                     assert_eq!(gaps.iter().any(|gap| gap.contains(position(k))), wanted, "{seed} {step}");
                 }
-                parts.note(range, as_of);
+                parts.record(range, as_of);
                 for k in ends[0]..=ends[1] {
                     plain[k as usize] = plain[k as usize].max(Some(as_of));
                 }
@@ -155,12 +155,12 @@ mod tests {
     fn adjacent_ranges_of_one_version_are_merged() {
         let mut parts = RangeVersions::default();
         for k in (0..10).rev().chain(12..19).chain(10..12).chain(20..30) {
-            parts.note(SetRange { first: position(k), last: position(k) }, 7);
+            parts.record(SetRange { first: position(k), last: position(k) }, 7);
         }
         // The positions between 9 and 10 and position 19 have no version.
         assert_eq!(parts.len(), 3);
-        parts.note(SetRange::ALL, 7);
-        parts.note(SetRange::ALL, 8);
+        parts.record(SetRange::ALL, 7);
+        parts.record(SetRange::ALL, 8);
         assert_eq!(parts.len(), 1);
     }
 }

@@ -4,7 +4,7 @@ use super::differences::Content;
 use super::layer_limits::LayerLimits;
 use super::nonce::Nonce;
 use super::receiver_config::{ReceiverConfig, ReceiverCounts};
-use super::replace::Work;
+use super::replace::WorkBudget;
 use super::set::VoxelSet;
 use super::set_range::SetRange;
 use super::stream::Stream;
@@ -26,7 +26,7 @@ pub struct Receiver {
     pub(super) counts: ReceiverCounts,
     nonce: Nonce,
     /// Arrival of the first packet with an unexpected epoch or number; `None` after a status has confirmed the sender.
-    unexplained_since: Option<Duration>,
+    unconfirmed_since: Option<Duration>,
     request_missing_at: Duration,
     /// Number of the packet as of which the layer was equal to the sender's set.
     pub(super) equal_as_of: Option<u64>,
@@ -39,7 +39,7 @@ pub struct Receiver {
 }
 
 /// Time after which a status is accepted without an answer: the link may have no back channel.
-const ONE_WAY: Duration = Duration::from_secs(5);
+const ONE_WAY_TIMEOUT: Duration = Duration::from_secs(5);
 /// Time before a lost packet is requested again. Its voxels arrive in the next frame.
 const RETRY: Duration = Duration::from_millis(1500);
 /// Time between two comparisons, per voxel and per tile of the layer: about twenty times the cost of a comparison.
@@ -68,7 +68,7 @@ impl Receiver {
             anti_entropy: AntiEntropy::default(),
             counts: ReceiverCounts::default(),
             nonce,
-            unexplained_since: None,
+            unconfirmed_since: None,
             request_missing_at: Duration::ZERO,
             equal_as_of: None,
             is_over_limit: false,
@@ -110,7 +110,7 @@ impl Receiver {
     /// Returns whether the layer was equal to the sender's set at the last known packet.
     pub fn is_converged(&self) -> bool {
         let Some(stream) = &self.stream else { return false };
-        stream.is_complete() && self.equal_as_of == Some(stream.highest) && self.unexplained_since.is_none()
+        stream.is_complete() && self.equal_as_of == Some(stream.highest) && self.unconfirmed_since.is_none()
     }
 
     /// Returns epoch and number of the packet as of which the layer was last equal to the sender's set.
@@ -152,7 +152,7 @@ impl Receiver {
         }
         if !self.stream.as_ref().is_some_and(|stream| stream.can_be(epoch, sequence)) {
             self.counts.unconfirmed += 1;
-            self.unexplained_since.get_or_insert(now);
+            self.unconfirmed_since.get_or_insert(now);
             return Ok(());
         }
         match packet {
@@ -163,7 +163,7 @@ impl Receiver {
                 let Some(layer) = &self.layer else { return Ok(()) };
                 let content = Content::new(layer.grid(), range, &voxels)
                     .ok_or_else(|| FormatError::at_offset(0, "the content has voxels outside its range"))?;
-                self.take_content(sequence, range, &content, &mut Work::of_a_packet(), now);
+                self.take_content(sequence, range, &content, &mut WorkBudget::per_packet(), now);
             }
             Packet::Digests { first, entries, .. } => self.take_digests(sequence, first, &entries, now),
             Packet::Status(_) => {}
@@ -189,7 +189,7 @@ impl Receiver {
                 self.is_over_limit = true;
             }
         }
-        stream.versions.note(sequence, updates.iter().map(|update| update.voxel));
+        stream.versions.record(sequence, updates.iter().map(|update| update.voxel));
     }
 
     /// Replaces a range of the layer with a packet's content, except for voxels that a later packet changed.
@@ -198,7 +198,7 @@ impl Receiver {
         as_of: u64,
         range: SetRange,
         content: &Content,
-        work: &mut Work,
+        work: &mut WorkBudget,
         now: Duration,
     ) {
         let Some(stream) = &mut self.stream else { return };
@@ -208,14 +208,14 @@ impl Receiver {
         stream.reach(as_of, now, self.config.patience);
         let Some(done) = self.replace(as_of, range, content, work) else { return };
         if let Some(stream) = &mut self.stream {
-            stream.versions.note_part(done, as_of);
+            stream.versions.record_range(done, as_of);
         }
         self.anti_entropy.take_content(done, now);
     }
 
     fn take_digests(&mut self, as_of: u64, first: TileIndex, entries: &[DigestEntry], now: Duration) {
         let Some(layer) = &mut self.layer else { return };
-        let mut work = Work::of_a_packet();
+        let mut work = WorkBudget::per_packet();
         for range in self.anti_entropy.take_digests(first, entries, layer, now) {
             // Keep requesting the range until it is done: the removal may exceed the work limit.
             self.anti_entropy.request_content(range);
@@ -227,9 +227,9 @@ impl Receiver {
         let Header { epoch, sequence } = status.header;
         let requested_at = self.nonce.take(status.nonce);
         let Some(stream) = self.stream.as_mut().filter(|stream| stream.can_be(epoch, sequence)) else {
-            let is_one_way = self.unexplained_since.is_some_and(|since| now >= since + ONE_WAY);
+            let is_one_way = self.unconfirmed_since.is_some_and(|since| now >= since + ONE_WAY_TIMEOUT);
             self.counts.unconfirmed += 1;
-            self.unexplained_since.get_or_insert(now);
+            self.unconfirmed_since.get_or_insert(now);
             if requested_at.is_some() || (is_one_way && status.nonce == 0) {
                 self.restart(status, now);
             }
@@ -243,7 +243,7 @@ impl Receiver {
             return;
         }
         if requested_at.is_some() {
-            self.unexplained_since = None;
+            self.unconfirmed_since = None;
         }
         stream.reach(sequence, now, self.config.patience);
         let is_lost = stream.give_up_before(status.oldest);
@@ -266,7 +266,7 @@ impl Receiver {
         self.equal_as_of = None;
         self.stream = Some(Stream::new(status.header.epoch, status.header.sequence, now, self.version_bytes));
         self.anti_entropy = AntiEntropy::default();
-        self.unexplained_since = None;
+        self.unconfirmed_since = None;
         self.to_compare = None;
         self.compare(status, false, now);
     }
@@ -308,7 +308,7 @@ impl Receiver {
             return Vec::new();
         }
         let mut requests = Vec::new();
-        let mut wants_status = self.unexplained_since.is_some() || self.stream.is_none();
+        let mut wants_status = self.unconfirmed_since.is_some() || self.stream.is_none();
         if let Some(stream) = &mut self.stream {
             if now >= self.request_missing_at {
                 let (sequences, is_hopeless) = stream.due(now, MAX_LISTED, RETRY);

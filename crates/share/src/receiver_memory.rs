@@ -4,7 +4,7 @@ use super::set::VoxelSet;
 use super::stream::Stream;
 
 /// Share of a receiver's memory for the versions of voxels: one over this number.
-const VERSIONS_PART: usize = 8;
+const VERSIONS_DIVISOR: usize = 8;
 
 impl Receiver {
     /// Minimum memory of a receiver, in bytes. With less, even small layers do not fit.
@@ -23,7 +23,7 @@ impl Receiver {
 
     /// Sets the maximum size of the versions from the receiver's guaranteed memory.
     pub(super) fn set_part_bytes(&mut self, bytes: usize) {
-        self.version_bytes = bytes / VERSIONS_PART;
+        self.version_bytes = bytes / VERSIONS_DIVISOR;
         if let Some(stream) = &mut self.stream {
             stream.versions.set_bytes(self.version_bytes);
         }

@@ -49,14 +49,14 @@ impl<K: Ord + Clone> Receivers<K> {
     /// that is too little, the largest layers shrink. A robot without a layer has no share before its first status.
     pub fn insert(&mut self, robot: K, config: ReceiverConfig, layer: Option<VoxelSet>) {
         self.robots.insert(robot, Receiver::started(config, layer));
-        self.share_out();
+        self.set_shares();
     }
 
     /// Gives every robot an equal share of the memory.
-    fn share_out(&mut self) {
+    fn set_shares(&mut self) {
         let part = self.part_bytes();
         self.robots.values_mut().for_each(|receiver| receiver.set_part_bytes(part));
-        self.make_room();
+        self.shrink_to_limit();
     }
 
     /// Returns the number of robots that have sent a status or have a layer.
@@ -66,7 +66,7 @@ impl<K: Ord + Clone> Receivers<K> {
 
     /// Returns whether the memory suffices for the share of one more robot.
     pub fn has_room(&self) -> bool {
-        self.for_all() / (self.known() + 1) >= Receiver::MIN_BYTES
+        self.usable_bytes() / (self.known() + 1) >= Receiver::MIN_BYTES
     }
 
     /// Removes a robot and returns its receiver.
@@ -82,29 +82,29 @@ impl<K: Ord + Clone> Receivers<K> {
     /// Bytes that are not a valid packet; the layer is unchanged.
     pub fn take(&mut self, robot: &K, bytes: &[u8], now: Duration) -> std::result::Result<(), FormatError> {
         let (all, part) = (self.memory_bytes(), self.part_bytes());
-        let for_all = self.for_all();
+        let usable = self.usable_bytes();
         let has_room = self.has_room();
         let Some(receiver) = self.robots.get_mut(robot) else { return Ok(()) };
         let was_known = receiver.layer().is_some();
         if !was_known && !has_room {
             return Ok(());
         }
-        let free = for_all.saturating_sub(all - receiver.memory_bytes());
+        let free = usable.saturating_sub(all - receiver.memory_bytes());
         receiver.set_memory_bytes(free.max(part));
         let taken = receiver.take(bytes, now);
         if receiver.layer().is_some() != was_known {
-            self.share_out();
+            self.set_shares();
         } else {
-            self.make_room();
+            self.shrink_to_limit();
         }
         taken
     }
 
     /// Shrinks the layers that exceed their share most, until the total is within the limit.
-    fn make_room(&mut self) {
+    fn shrink_to_limit(&mut self) {
         let part = self.part_bytes();
         loop {
-            let excess = self.memory_bytes().saturating_sub(self.for_all());
+            let excess = self.memory_bytes().saturating_sub(self.usable_bytes());
             let most = self.robots.values_mut().max_by_key(|receiver| receiver.memory_bytes());
             let Some(receiver) = most.filter(|receiver| excess > 0 && receiver.memory_bytes() > part) else {
                 return;
@@ -124,15 +124,15 @@ impl<K: Ord + Clone> Receivers<K> {
 
     /// Returns the guaranteed share of each robot, in bytes.
     pub fn part_bytes(&self) -> usize {
-        self.for_all() / self.known().max(1)
+        self.usable_bytes() / self.known().max(1)
     }
 
     /// Returns the free memory in bytes, without the reserve for one packet.
     pub fn free_bytes(&self) -> usize {
-        self.for_all().saturating_sub(self.memory_bytes())
+        self.usable_bytes().saturating_sub(self.memory_bytes())
     }
 
-    fn for_all(&self) -> usize {
+    fn usable_bytes(&self) -> usize {
         self.memory_bytes - PACKET_BYTES
     }
 

@@ -9,10 +9,10 @@ const MAX_CHANGES: usize = 1 << 20;
 const BRICKS_AT_A_TIME: usize = 1024;
 
 /// Number of voxels that a packet may still change.
-pub(super) struct Work(usize);
+pub(super) struct WorkBudget(usize);
 
-impl Work {
-    pub(super) fn of_a_packet() -> Self {
+impl WorkBudget {
+    pub(super) fn per_packet() -> Self {
         Self(MAX_CHANGES)
     }
 }
@@ -25,7 +25,7 @@ impl Receiver {
         as_of: u64,
         range: SetRange,
         content: &Content,
-        work: &mut Work,
+        work: &mut WorkBudget,
     ) -> Option<SetRange> {
         let parts = self.stream.as_ref()?.versions.not_replaced(range, as_of);
         for part in parts {
@@ -51,7 +51,7 @@ impl Receiver {
         Some(range)
     }
 
-    fn replace_brick(&mut self, as_of: u64, difference: &Difference, work: &mut Work) -> Option<()> {
+    fn replace_brick(&mut self, as_of: u64, difference: &Difference, work: &mut WorkBudget) -> Option<()> {
         let (stream, layer) = (self.stream.as_ref()?, self.layer.as_mut()?);
         let (tile, brick) = difference.place;
         let min = layer.grid().voxels_of_tile(tile).min;

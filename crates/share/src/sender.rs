@@ -28,7 +28,7 @@ pub struct Sender {
     pub(super) config: SenderConfig,
     epoch: u32,
     /// The current set.
-    wanted: VoxelSet,
+    current: VoxelSet,
     /// The set as sent: the layer of a receiver that has every packet.
     pub(super) sent: VoxelSet,
     pub(super) send_buffer: SendBuffer,
@@ -75,7 +75,7 @@ impl Sender {
             ring: Ring::new(config.ring_packets),
             config,
             epoch,
-            wanted: set.clone(),
+            current: set.clone(),
             sent: set,
             send_buffer: SendBuffer::default(),
             counts: SenderCounts::default(),
@@ -108,19 +108,19 @@ impl Sender {
 
     /// Returns whether a voxel is in the set.
     pub fn contains(&self, voxel: VoxelIndex) -> bool {
-        self.wanted.contains(voxel)
+        self.current.contains(voxel)
     }
 
     /// Adds a voxel to the set or removes it.
     pub fn put(&mut self, voxel: VoxelIndex, is_in: bool) {
-        if self.wanted.put(voxel, is_in) {
+        if self.current.put(voxel, is_in) {
             self.send_buffer.put(voxel, is_in, self.sent.contains(voxel));
         }
     }
 
     /// Replaces the voxels of a brick in a tile.
     pub fn put_brick(&mut self, tile: TileIndex, brick: BrickCode, mask: BrickMask) {
-        let before = self.wanted.brick(tile, brick);
+        let before = self.current.brick(tile, brick);
         if before == mask {
             return;
         }
@@ -130,7 +130,7 @@ impl Sender {
             let voxel = brick.voxel(place).to_key().to_index_from(min);
             self.send_buffer.put(voxel, is_in_mask(&mask, place), is_in_mask(&sent, place));
         }
-        self.wanted.put_brick(tile, brick, mask);
+        self.current.put_brick(tile, brick, mask);
     }
 
     /// Returns the packets to send now: a frame and a status, if they are due.
@@ -211,7 +211,7 @@ impl Sender {
 
     /// Encodes the current state of voxels in as many packets as needed. Voxels that are close together share a packet.
     fn packets_of(&mut self, mut voxels: Vec<VoxelIndex>, repaired: &[u64]) -> Vec<Outgoing> {
-        voxels.sort_by_cached_key(|&voxel| along_curve(voxel));
+        voxels.sort_by_cached_key(|&voxel| morton_position(voxel));
         voxels.dedup();
         let updates: Vec<Update> =
             voxels.iter().map(|&voxel| Update { voxel, is_in: self.sent.contains(voxel) }).collect();
@@ -258,7 +258,7 @@ impl Sender {
 }
 
 /// Returns the position of a voxel on the Morton curve through all voxel indices.
-fn along_curve(voxel: VoxelIndex) -> (u64, u64) {
+fn morton_position(voxel: VoxelIndex) -> (u64, u64) {
     let part = |shift: u32| {
         let [x, y, z] = voxel.map(|k| ((k as u32 ^ 1 << 31) >> shift) as u16);
         VoxelKey([x, y, z]).morton().0

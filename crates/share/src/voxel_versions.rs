@@ -13,7 +13,7 @@ pub(super) struct VoxelVersions {
     /// Version of each voxel. The hash has a random seed, because other robots choose the voxels.
     last: HashMap<VoxelIndex, u64>,
     /// Voxels with their packets, in the order of arrival.
-    noted: VecDeque<(u64, VoxelIndex)>,
+    recorded: VecDeque<(u64, VoxelIndex)>,
     max_voxels: usize,
     /// Highest number of these packets.
     newest: u64,
@@ -28,25 +28,25 @@ const MAX_VOXELS: usize = 1 << 18;
 /// Minimum number of voxel versions, enough for a typical packet.
 const MIN_VOXELS: usize = 1 << 12;
 /// Maximum number of range versions.
-const MAX_PARTS: usize = 4096;
+const MAX_RANGES: usize = 4096;
 
 /// Maximum number of bytes per voxel: table and queue have both just doubled.
 const BYTES_PER_VOXEL: usize =
     (size_of::<(VoxelIndex, u64)>() + 1) * 16 / 7 + 2 * size_of::<(u64, VoxelIndex)>();
 /// Upper bound on the memory of all range versions, in bytes: a B-tree node has space for 11 ranges and holds at least
 /// five.
-const BYTES_OF_PARTS: usize = MAX_PARTS / 5 * 11 * 2 * size_of::<SetRange>();
+const RANGE_BYTES: usize = MAX_RANGES / 5 * 11 * 2 * size_of::<SetRange>();
 
 impl VoxelVersions {
     /// Creates the versions of a stream that starts after packet `forgotten`, with a memory limit of `bytes`.
     pub(super) fn new(forgotten: u64, bytes: usize) -> Self {
-        let (last, noted, parts) = (HashMap::new(), VecDeque::new(), RangeVersions::default());
-        Self { last, noted, max_voxels: voxels_of(bytes), newest: forgotten, parts, forgotten }
+        let (last, recorded, parts) = (HashMap::new(), VecDeque::new(), RangeVersions::default());
+        Self { last, recorded, max_voxels: voxels_of(bytes), newest: forgotten, parts, forgotten }
     }
 
     /// Returns an upper bound on the memory in bytes, for a limit of `bytes`.
     pub(super) fn max_bytes(bytes: usize) -> usize {
-        voxels_of(bytes) * BYTES_PER_VOXEL + BYTES_OF_PARTS
+        voxels_of(bytes) * BYTES_PER_VOXEL + RANGE_BYTES
     }
 
     /// Changes the memory limit.
@@ -55,7 +55,7 @@ impl VoxelVersions {
         if self.max_voxels < before {
             self.forget_all_but(self.max_voxels);
             self.last.shrink_to_fit();
-            self.noted.shrink_to_fit();
+            self.recorded.shrink_to_fit();
         }
     }
 
@@ -80,12 +80,12 @@ impl VoxelVersions {
     }
 
     /// Records a packet as the version of its voxels.
-    pub(super) fn note(&mut self, sequence: u64, voxels: impl ExactSizeIterator<Item = VoxelIndex>) {
+    pub(super) fn record(&mut self, sequence: u64, voxels: impl ExactSizeIterator<Item = VoxelIndex>) {
         // Forget old versions first, so that the limit is never exceeded.
         self.forget_all_but(self.max_voxels.saturating_sub(voxels.len()));
         self.newest = self.newest.max(sequence);
         for voxel in voxels {
-            if self.noted.len() == self.max_voxels {
+            if self.recorded.len() == self.max_voxels {
                 // A packet that exceeds the limit is treated as forgotten.
                 self.forget_all_but(0);
                 self.forget_up_to(sequence);
@@ -93,14 +93,14 @@ impl VoxelVersions {
             }
             let version = self.last.entry(voxel).or_insert(sequence);
             *version = sequence.max(*version);
-            self.noted.push_back((sequence, voxel));
+            self.recorded.push_back((sequence, voxel));
         }
     }
 
     /// Records the version of a range that was replaced.
-    pub(super) fn note_part(&mut self, range: SetRange, as_of: u64) {
-        self.parts.note(range, as_of);
-        while self.parts.len() > MAX_PARTS
+    pub(super) fn record_range(&mut self, range: SetRange, as_of: u64) {
+        self.parts.record(range, as_of);
+        while self.parts.len() > MAX_RANGES
             && let Some(oldest) = self.parts.oldest()
         {
             self.forget_up_to(oldest);
@@ -109,11 +109,11 @@ impl VoxelVersions {
 
     fn forget_all_but(&mut self, voxels: usize) {
         let mut forgotten = self.forgotten;
-        while let Some(&(sequence, voxel)) = self.noted.front() {
-            if self.noted.len() <= voxels && sequence > forgotten {
+        while let Some(&(sequence, voxel)) = self.recorded.front() {
+            if self.recorded.len() <= voxels && sequence > forgotten {
                 break;
             }
-            self.noted.pop_front();
+            self.recorded.pop_front();
             forgotten = forgotten.max(sequence);
             if self.last.get(&voxel).is_some_and(|&version| version <= forgotten) {
                 self.last.remove(&voxel);
