@@ -5,7 +5,7 @@ use std::thread::JoinHandle;
 ///
 /// # Errors
 ///
-/// The system refuses.
+/// The system cannot create the thread.
 pub fn spawn(name: &str, work: impl FnOnce() + Send + 'static) -> anyhow::Result<JoinHandle<()>> {
-    std::thread::Builder::new().name(name.to_owned()).spawn(work).context("a thread cannot be started")
+    std::thread::Builder::new().name(name.to_owned()).spawn(work).context("cannot start a thread")
 }

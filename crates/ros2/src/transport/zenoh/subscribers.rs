@@ -2,23 +2,25 @@ use std::collections::BTreeSet;
 use std::sync::{Arc, Mutex, PoisonError};
 use zenoh::sample::SampleKind;
 
-/// Tokens of the subscriptions of a topic that are there now.
+/// Tokens of the current subscriptions of a topic.
 #[derive(Clone, Debug, Default)]
-pub struct Listeners(Arc<Mutex<BTreeSet<String>>>);
+pub struct Subscribers(Arc<Mutex<BTreeSet<String>>>);
 
-/// More are not told apart: no flood of tokens is kept.
-const MOST: usize = 1024;
-const LONGEST_TOKEN: usize = 2048;
+/// Maximum number of counted subscriptions, which bounds the memory under a flood of tokens.
+const MAX_COUNT: usize = 1024;
+const MAX_TOKEN_BYTES: usize = 2048;
 
-impl Listeners {
-    /// A token has come or gone.
+impl Subscribers {
+    /// Records a new or removed token.
     pub fn note(&self, token: &str, kind: SampleKind) {
         let mut tokens = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         match kind {
-            SampleKind::Put if tokens.len() < MOST && token.len() <= LONGEST_TOKEN => {
+            SampleKind::Put if tokens.len() < MAX_COUNT && token.len() <= MAX_TOKEN_BYTES => {
                 tokens.insert(token.to_owned());
             }
-            SampleKind::Put => log::debug!("a subscription more than {MOST} is not counted"),
+            SampleKind::Put => {
+                log::debug!("subscription not counted: more than {MAX_COUNT}, or its token is too long")
+            }
             SampleKind::Delete => {
                 tokens.remove(token);
             }
@@ -36,14 +38,14 @@ mod tests {
 
     #[test]
     fn a_flood_of_tokens_is_not_kept() {
-        let listeners = Listeners::default();
-        for number in 0..2 * MOST {
-            listeners.note(&format!("token/{number}"), SampleKind::Put);
+        let subscribers = Subscribers::default();
+        for number in 0..2 * MAX_COUNT {
+            subscribers.note(&format!("token/{number}"), SampleKind::Put);
         }
-        listeners.note(&"x".repeat(LONGEST_TOKEN + 1), SampleKind::Put);
-        assert_eq!(listeners.count(), MOST);
-        listeners.note("token/3", SampleKind::Delete);
-        listeners.note("token/3", SampleKind::Delete);
-        assert_eq!(listeners.count(), MOST - 1);
+        subscribers.note(&"x".repeat(MAX_TOKEN_BYTES + 1), SampleKind::Put);
+        assert_eq!(subscribers.count(), MAX_COUNT);
+        subscribers.note("token/3", SampleKind::Delete);
+        subscribers.note("token/3", SampleKind::Delete);
+        assert_eq!(subscribers.count(), MAX_COUNT - 1);
     }
 }
