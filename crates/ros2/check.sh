@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Tests the node with an independent peer over loopback (Cyclone DDS from PyPI; for zenoh, eclipse-zenoh). The map of
 # the node and the map that `voxtile build` creates from the same messages must have the same digest, even with a
-# hostile peer. Outputs must equal those of `voxtile export`; services are called, too. Passes with a message if Python
+# hostile peer. Outputs must equal those of `voxtile export`; services are also called. Passes with a message if Python
 # or PyPI is missing. The kind rclpy uses ROS 2 itself: rclpy of Jazzy over Fast DDS, from PyPI (for Python 3.11).
 #
 # check.sh [friendly] [hostile] [types] [variants] [odometry] [launch] [path] [real] [sensors] [flood] [rclpy] [zenoh]
@@ -152,7 +152,7 @@ rclpy() {
     echo "rclpy: $of_node"
 }
 
-# Builds the node again, because the feature is off by default.
+# Builds the node with the feature `zenoh`, which is off by default.
 zenoh() {
     local python=${VOXTILE_ZENOH_PYTHON:-$python} program=${VOXTILE_ROS2_ZENOH:-}
     if ! "$python" -c 'import zenoh, zenoh.ext, cyclonedds, rosbags' 2>/dev/null; then

@@ -198,7 +198,7 @@ fn domain_id_of<'de, D: Deserializer<'de>>(parameter: D) -> Result<u16, D::Error
     (id <= MAX_DOMAIN_ID).then_some(id).ok_or_else(too_large)
 }
 
-/// Accepts a string or a list of strings.
+/// Deserializes a string or a list of strings.
 fn one_or_more<'de, D: Deserializer<'de>>(parameter: D) -> Result<Vec<String>, D::Error> {
     #[derive(Deserialize)]
     #[serde(untagged, expecting = "expected a string or a list of strings")]
@@ -291,7 +291,7 @@ impl Args {
             self.occupancy_max_z.unwrap_or(f64::INFINITY),
         ];
         let [least, most] = heights_m;
-        ensure!(least < most, "--occupancy-min-z: {least} is not below --occupancy-max-z, {most}");
+        ensure!(least < most, "--occupancy-min-z: {least} must be below --occupancy-max-z ({most})");
         Ok(Extent { radius_m, heights_m })
     }
 

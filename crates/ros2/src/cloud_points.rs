@@ -24,7 +24,7 @@ impl CloudPoints {
         let mut positions_m = Vec::with_capacity(count);
         let mut intensities = message.has_intensities().then(|| Vec::with_capacity(count));
         for point in message.points() {
-            // A point at the origin has no return.
+            // Store points without a return at the origin.
             positions_m.push(if point.is_return { point.position_m } else { [0.0; 3] });
             if let Some(intensities) = &mut intensities {
                 intensities.push(point.intensity);

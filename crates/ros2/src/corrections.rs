@@ -17,8 +17,8 @@ pub struct Corrections {
     pub most_turned: f64,
 }
 
-/// Maximum difference between the stamps of a scan and its path pose. Paths often have coarse stamps in seconds as
-/// floats.
+/// Maximum difference between the stamps of a scan and its path pose, because paths are often stored with rounded
+/// seconds.
 const SAME_STAMP_NS: u64 = 1_000_000;
 /// Stamps that decrease by more than this begin a new run.
 const ANOTHER_RUN_NS: i64 = 2_000_000_000;

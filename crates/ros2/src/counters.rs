@@ -7,9 +7,9 @@ pub struct Counters {
     pub dropped_behind: u64,
     /// Clouds skipped by `thin`.
     pub thinned: u64,
-    /// Clouds whose transforms did not arrive in time. Clouds already in the map frame count too.
+    /// Clouds whose transforms did not arrive in time, and clouds that are already in the map frame.
     pub dropped_without_pose: u64,
-    /// Clouds and transforms that could not be decoded, or only in part.
+    /// Clouds and transforms that could not be decoded completely.
     pub malformed: u64,
     /// Clouds that exceed the queue with their points decoded.
     pub too_large: u64,

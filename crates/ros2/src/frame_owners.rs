@@ -31,9 +31,9 @@ enum Rank {
     Mounted,
 }
 
-/// A publisher loses one in this number of its frames at a time.
+/// Inverse of the fraction of a publisher's frames that is dropped at a time.
 const PART: usize = 4;
-/// Minimum number of frames dropped at a time, of several publishers if necessary, because the selection takes time.
+/// Minimum number of frames dropped at a time, because the selection is slow. Several publishers may be affected.
 const MIN_FORGOTTEN: usize = 100;
 
 impl FrameOwners {

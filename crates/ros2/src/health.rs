@@ -8,7 +8,7 @@ pub struct Health {
     pub statistics: MapStatistics,
     /// Number of scans that a crash would lose.
     pub unflushed_scans: u64,
-    /// Time since the last flush completed, or since the map changed if it was flushed completely.
+    /// Time since the map on disk was last complete or last updated by a flush.
     pub flush_age: Duration,
     pub is_flushing: bool,
     /// Whether the last flush failed.

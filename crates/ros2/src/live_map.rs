@@ -98,7 +98,7 @@ impl LiveMap {
         self.lock().reader.clone()
     }
 
-    /// Returns the header of messages about a moment.
+    /// Returns a message header with the stamp of `moment` and the map frame.
     pub fn header(&self, moment: &Moment) -> Header {
         Header { stamp: Time::from_ns(moment.stamp_ns), frame_id: self.frame.clone() }
     }

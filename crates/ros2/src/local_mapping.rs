@@ -84,7 +84,7 @@ mod tests {
         local.refresh(&mapper);
         local.insert(&scan(3.05));
         assert_eq!((state(2.05), local.bytes()), (None, 0));
-        live.local().want(true);
+        live.local().set_wanted(true);
         local.refresh(&mapper);
         // One miss does not clear the first hit. The voxel beyond the radius is not copied.
         assert_eq!(
@@ -98,7 +98,7 @@ mod tests {
         assert_eq!(state(3.05), None);
         local.refresh(&mapper);
         assert_eq!(state(3.05), Some(LocalState::None));
-        live.local().want(false);
+        live.local().set_wanted(false);
         local.refresh(&mapper);
         assert_eq!((state(2.05), local.bytes()), (None, 0));
     }

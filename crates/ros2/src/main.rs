@@ -48,8 +48,8 @@ use std::sync::Arc;
 fn main() -> ExitCode {
     // Use one malloc arena, so that --memory holds: DDS and the mapper run many threads.
     voxtile::begin_with_one_heap();
-    // ros2-client logs an error for each topic without subscribers. The rustdds writer logs one when a reader requests
-    // a message again that a newer one replaced; some readers repeat that request a hundred times.
+    // ros2-client logs an error when it counts the subscribers of a topic without any. The rustdds writer logs an error
+    // when a reader requests a message that a newer one has replaced; some readers repeat the request 100 times.
     let filter = "info,rustdds=error,rustdds::rtps::writer=off,ros2_client=off";
     env_logger::Builder::from_env(env_logger::Env::default().default_filter_or(filter)).init();
     let arguments: Vec<_> = std::env::args_os().collect();

@@ -39,7 +39,7 @@ pub struct Mapping {
     /// Memory of a remapping.
     remapping_bytes: usize,
     folder: PathBuf,
-    /// Largest displacement in metres that is not a correction.
+    /// Paths that move scans by at most this many metres are ignored.
     path_tolerance_m: f64,
     flush_every: Duration,
     flushed_at: Instant,
@@ -50,7 +50,7 @@ pub struct Mapping {
     warned_at: Option<Instant>,
     logged_at: Instant,
     sampled_at: Instant,
-    /// Time when the map on disk was last seen complete or advanced, and its last scan then.
+    /// Time when the map on disk was last complete or last advanced, and its last scan then.
     durable: (Instant, u64),
 }
 
@@ -221,7 +221,7 @@ impl Mapping {
         begun.or_else(if_fatal)
     }
 
-    /// Records the result of a flush. A failure is the response to pending saves; the next flush retries.
+    /// Records the result of a flush. On failure, pending save requests get the error, and the next flush retries.
     fn note_flush(&mut self, flushed: &voxtile::Result<()>) {
         self.answer_saves();
         self.has_flush_failed = flushed.is_err();
@@ -234,7 +234,7 @@ impl Mapping {
         log::warn!("a flush failed and will be retried; durable up to scan {durable}: {error:#}");
     }
 
-    /// Returns an error after flushing the mapped scans, if the disk permits.
+    /// Flushes the mapped scans, if the disk permits, and returns `error`.
     fn give_up(mut self, error: Error) -> anyhow::Result<()> {
         match self.mapper.flush() {
             Ok(()) => log::info!("flushed the map up to scan {}", self.mapper.scan_number()),
@@ -248,7 +248,7 @@ impl Mapping {
         Err(error.into())
     }
 
-    /// Executes a service request, or begins it.
+    /// Executes or begins a service request.
     fn execute(mut self, placed: PlacedOrder) -> anyhow::Result<Self> {
         let order = placed.order.clone();
         match order {
@@ -273,7 +273,7 @@ impl Mapping {
     /// Follows corrected paths one after the other, concurrently with mapping until few scans remain.
     fn follow(mut self) -> anyhow::Result<Self> {
         if let Some(path) = self.inbox.take_path() {
-            // A later path replaces this one, but its wait began with the first.
+            // A newer path replaces a waiting one without extending the wait.
             let scan = self.path.take().map_or(self.mapper.scan_number(), |(scan, _)| scan);
             self.path = Some((scan, path));
         }
@@ -343,7 +343,7 @@ impl Mapping {
         placed: PlacedOrder,
         change: impl FnOnce(&Path) -> voxtile::Result<String>,
     ) -> anyhow::Result<Self> {
-        // Pending and active paths refer to the scans before the change, which may no longer exist.
+        // Pending and active paths refer to scans before the change, which may no longer exist.
         let paths =
             [self.remapping.take().is_some(), self.path.take().is_some(), self.inbox.take_path().is_some()];
         if paths.contains(&true) {
@@ -369,7 +369,7 @@ impl Mapping {
         let config = self.mapper.config().clone();
         drop(self.mapper);
         let outcome = change(&self.folder);
-        // A changed map that does not open ends the node.
+        // If the changed map cannot be opened, the node ends.
         let mapper = OutOfCoreTileMapper::open(&self.folder, config)?;
         self.live.note_opening(mapper.reader()?, None);
         let durable = (Instant::now(), mapper.flushed_scan_number());
@@ -420,7 +420,7 @@ impl Mapping {
         let scan = points.scan(world_from_sensor, cloud.stamp_ns);
         match scan.and_then(|scan| self.mapper.insert_points(&scan).map(|_| scan)) {
             Ok(scan) => {
-                // Before `note_scan`: the publishers then publish once what they find.
+                // Update the local map before `note_scan`: publishers send each version once.
                 self.local.insert(&scan);
                 let (scan_number, sensor_m) = (self.mapper.scan_number(), world_from_sensor.position_m);
                 self.live.note_scan(scan_number, sensor_m, cloud.stamp_ns);

@@ -40,7 +40,7 @@ pub struct Order {
     pub memory_bytes: usize,
 }
 
-/// Largest rotation that is not a correction: half a degree, in radians.
+/// Rotation in radians up to which a path is ignored: half a degree.
 const TOLERANCE: f64 = PI / 360.0;
 
 impl Remapping {
@@ -90,7 +90,7 @@ impl Remapping {
 impl Drop for Remapping {
     /// Stops the remapping. The map is unchanged.
     fn drop(&mut self) {
-        // After `end` there is no thread, and the stop flag must remain unset for finishing.
+        // `end` took the thread. The stop flag must remain unset, because the remapping is still to be finished.
         let Some(thread) = self.thread.take() else { return };
         self.stop.set();
         let _ = self.flushes.send(());

@@ -1,8 +1,8 @@
 use std::collections::HashMap;
 use std::time::{Duration, Instant};
 
-/// Distinguishes invalid stamps from a clock that has jumped, for example because a robot's time was set or a
-/// simulation restarted. Each child frame is judged separately, so a wrong clock of one frame does not affect others.
+/// Distinguishes invalid stamps from a jump of the clock, for example when a robot's time is set or a simulation
+/// restarts. Each child frame is judged separately, so a wrong clock of one frame does not affect others.
 #[derive(Debug, Default)]
 pub struct StampCheck {
     /// Newest accepted stamp of all frames.
@@ -84,7 +84,7 @@ impl StampCheck {
         jumped
     }
 
-    /// Returns whether more frames are off than have had a stamp accepted since `since`.
+    /// Returns whether more frames are off than have had a stamp accepted after `since`.
     fn are_most_off(&self, since: Instant) -> bool {
         let is_off = |known: &&Child| known.off_since.is_some();
         let is_on_time = |known: &&Child| !is_off(known) && known.taken.is_some_and(|taken| taken >= since);
@@ -189,7 +189,7 @@ mod tests {
                 }
             }
         }
-        // After that the arm has the wrong clock.
+        // After the reset, the arm's clock is ahead of the others.
         assert_eq!(jumps, ["arm base odom rests", "arm"]);
     }
 }

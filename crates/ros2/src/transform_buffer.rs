@@ -21,7 +21,7 @@ pub struct TransformBuffer {
     stamps: StampCheck,
     fixed_frame: String,
     max_wait: Duration,
-    /// Samples since the last removal of old ones, and the samples left then.
+    /// Number of samples since the last removal of old ones, and number left after it.
     samples: (usize, usize),
     owners: FrameOwners,
     /// Frames of clouds, each with the stamp of the last cloud that had a pose.
@@ -124,7 +124,7 @@ impl TransformBuffer {
         let mut needed = HashSet::new();
         for (sensor, stamp_ns) in &self.sensors {
             needed.extend(self.transforms.frames_between(fixed, sensor).unwrap_or_default());
-            // The transforms used last may differ from `frames_between`, which a flood can extend beyond the limit.
+            // Also keep the frames of the last pose, because a flood of ancestors can make `frames_between` fail.
             let last = stamp_ns.map(|stamp_ns| self.transforms.links_between(fixed, sensor, stamp_ns));
             needed.extend(last.and_then(Result::ok).into_iter().flatten().flatten());
         }
@@ -216,7 +216,7 @@ impl TransformBuffer {
     }
 
     fn look_up(&self, cloud: &Cloud) -> Result<RigidPose, WhyNot> {
-        // A cloud in the map frame has no sensor position: its rays would begin at the origin.
+        // Without a sensor position, the rays of a cloud in the map frame would begin at the origin.
         if bare(&cloud.frame) == self.fixed_frame {
             return Err(WhyNot::AlreadyFixed(self.fixed_frame.clone()));
         }
@@ -229,7 +229,7 @@ fn printable(why: &dyn std::fmt::Display) -> String {
     why.to_string().escape_debug().to_string()
 }
 
-/// Returns advice for clouds without a pose, if the reason does not suggest it.
+/// Returns additional advice for clouds without a pose, or an empty string.
 fn remedy(why: &WhyNot) -> &'static str {
     match why {
         WhyNot::AlreadyFixed(_) => {

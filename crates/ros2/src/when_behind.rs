@@ -2,7 +2,7 @@
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum, serde::Deserialize, serde::Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum WhenBehind {
-    /// Block until there is memory; clouds that the transport cannot keep are lost uncounted.
+    /// Wait for free memory; clouds that the transport drops meanwhile are not counted.
     Wait,
     /// Drop the oldest waiting cloud.
     DropOldest,

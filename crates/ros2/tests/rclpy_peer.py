@@ -140,7 +140,7 @@ def main():
     origin = [0.01 * (5 * (clouds - 1) + 0.35), 0.5, 0.0]
     summary = check_outputs(peer, voxtile, folder, origin, radius, max_z)
     print(f"rclpy: {summary}")
-    # The map is flushed: its copy is the reference for `voxtile build`.
+    # The map is flushed. check.sh compares this copy with the output of `voxtile build`.
     shutil.copytree(folder, f"{folder}.saved")
     peer.call(Empty, "reset")
     peer.wait("cleared voxels are still published", lambda: peer.last["/octomap_point_cloud_centers"].width == 0)

@@ -95,7 +95,7 @@ for kind in friendly hostile; do
     compare $kind live
     if [ $kind = hostile ]; then
         grep -q ' 1 too large' "$map.counters" || fail "a cloud larger than the queue is not counted"
-        # The limit covers the message of 17 MiB, the queue of 16 MiB and received messages.
+        # The limit covers the message of 17 MiB, the queue of 16 MiB and further messages.
         echo "zenoh: $((peak_kib[friendly] >> 10)) MiB of memory, $((peak_kib[hostile] >> 10)) with a hostile peer"
         [ ${peak_kib[hostile]} -lt $((peak_kib[friendly] + (64 << 10))) ] || fail "a hostile peer takes memory"
         grep -q ' 0 malformed' "$map.counters" && fail "malformed clouds are not counted"

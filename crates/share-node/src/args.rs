@@ -77,15 +77,15 @@ pub struct Args {
     /// Stop after S seconds [default: on Ctrl-C or SIGTERM]
     #[arg(long = "for", value_name = "S")]
     pub seconds: Option<f64>,
-    /// With --subscribe: stop once the layers of all robots, and of each robot given with --robot, have equalled the
-    /// robots' sets for three seconds
+    /// With --subscribe: stop once a layer exists, each robot given with --robot has one, and all layers have equalled
+    /// the robots' sets for three seconds
     #[arg(long)]
     pub until_equal: bool,
     /// With --subscribe: keep the layers only; do not change MAP
     #[arg(long)]
     pub keep_apart: bool,
-    /// Memory for all layers. When it is full, each robot is entitled to an equal share: robots above their share drop
-    /// voxels that others need the memory for, and voxels beyond the share are refused
+    /// Memory for all layers. When it is full, each robot may use an equal share: robots above it drop voxels as others
+    /// need memory, and new voxels beyond it are refused
     #[arg(long, value_name = "SIZE", default_value = "512MiB", help_heading = "Limits")]
     pub memory: ByteSize,
     /// Maximum number of robots; robots given with --robot are always accepted

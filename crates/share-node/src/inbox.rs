@@ -32,8 +32,8 @@ struct State {
 struct Queue {
     messages: VecDeque<Message>,
     bytes: usize,
-    /// Processing time of its messages. At least that of the queue served last when the first message was queued: an
-    /// idle robot accumulates no credit.
+    /// Processing time of its messages. An empty queue that gets a message is raised to the queue served last, so that
+    /// idle robots accumulate no credit.
     spent: Duration,
 }
 
@@ -145,11 +145,11 @@ mod tests {
         (0..1000).for_each(|_| inbox.put("flood", message("flood", 60_000)));
         (0..1000).for_each(|_| inbox.put("unknown", message("unknown", 60_000)));
         assert!(inbox.lock().bytes <= MAX_BYTES);
-        let came: Vec<String> =
+        let received: Vec<String> =
             std::iter::from_fn(|| inbox.next(Duration::ZERO)).map(|message| message.key).collect();
-        assert_eq!(came.iter().filter(|robot| *robot == "a").count(), 10);
-        assert!(came.iter().filter(|robot| *robot == "flood").count() > 20);
-        assert!(came.iter().filter(|robot| *robot == "unknown").count() > 20);
+        assert_eq!(received.iter().filter(|robot| *robot == "a").count(), 10);
+        assert!(received.iter().filter(|robot| *robot == "flood").count() > 20);
+        assert!(received.iter().filter(|robot| *robot == "unknown").count() > 20);
         assert_eq!(inbox.lock().bytes, 0);
     }
 
@@ -161,14 +161,14 @@ mod tests {
             inbox.put("quick", message("quick", 10));
             inbox.put("slow", message("slow", 10));
         }
-        let mut came = BTreeMap::<String, usize>::new();
+        let mut received = BTreeMap::<String, usize>::new();
         for _ in 0..101 {
             let robot = inbox.next(Duration::ZERO).unwrap().key;
             let took = Duration::from_millis(if robot == "slow" { 1000 } else { 10 });
             inbox.lock().queue(&robot).spent += took;
-            *came.entry(robot).or_default() += 1;
+            *received.entry(robot).or_default() += 1;
         }
-        assert!(came["slow"] <= 2 && came["quick"] >= 99, "{came:?}");
+        assert!(received["slow"] <= 2 && received["quick"] >= 99, "{received:?}");
         inbox.admit("slow", false);
         assert!(inbox.next(Duration::ZERO).is_none() || inbox.lock().bytes == 0);
     }

@@ -15,9 +15,9 @@ pub struct Link {
     subscribers: Vec<zenoh::pubsub::Subscriber<()>>,
 }
 
-/// Larger messages are not voxtile's and are ignored.
+/// Larger messages are ignored: voxtile sends none.
 const MAX_BYTES: usize = 64 << 10;
-/// Longer keys are not voxtile's and are ignored.
+/// Longer keys are ignored: voxtile uses none.
 const MAX_KEY: usize = 128;
 
 impl Link {
@@ -37,7 +37,7 @@ impl Link {
         let mut set = |key: &str, value: String| {
             config.insert_json5(key, &value).map_err(|error| anyhow!("{key}: {error}"))
         };
-        // Zenoh's defaults listen on every interface and scout by multicast; that requires a configuration file here.
+        // Unlike Zenoh's defaults, do not listen on every interface or scout by multicast unless the file sets it.
         if !file.sets("mode") {
             set("mode", "\"peer\"".into())?;
         }
@@ -56,7 +56,7 @@ impl Link {
         }
         if !args.connect.is_empty() || has_no_endpoint {
             set("connect/endpoints", serde_json::to_string(&connect)?)?;
-            // Retry endpoints that are not reachable yet, without end.
+            // Retry unreachable endpoints without a time limit.
             set("connect/timeout_ms", "-1".into())?;
             set("connect/exit_on_failure", "false".into())?;
         }
@@ -99,7 +99,7 @@ impl Link {
 
     pub fn close(self) {
         drop(self.subscribers);
-        // A session that fails to close needs no handling.
+        // Ignore a failure to close the session.
         let _ = self.session.close().wait();
     }
 }

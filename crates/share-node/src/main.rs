@@ -30,7 +30,7 @@ fn main() -> ExitCode {
         Err(error) => {
             output::report(format_args!("{error:#}"));
             if args.json {
-                // A failure to print cannot be reported: standard output may be closed.
+                // Ignore a failure, because standard output may be closed.
                 let _ = json::print(&json::failure(&error));
             }
             ExitCode::from(if error.is::<voxtile::Error>() { 2 } else { 1 })

@@ -12,7 +12,7 @@ use voxtile_share::codec::{CONTEXTS, Packet, count_contexts};
 use voxtile_share::{MapWatch, Receiver, ReceiverConfig, Sender};
 
 const STEP: Duration = Duration::from_millis(50);
-/// Time after the last scan when a run counts as failed.
+/// Time limit of a run after the last scan.
 const TIMEOUT: Duration = Duration::from_secs(600);
 /// Run time after the last scan without catch-up. The first scan is sent after twice this time.
 const REST: Duration = Duration::from_secs(5);

@@ -142,7 +142,7 @@ fn send(link: &Link, robot: &str, packets: Vec<Outgoing>) -> anyhow::Result<()> 
     Ok(())
 }
 
-/// Prints the shared set. Called when all of it was sent.
+/// Prints the size and digest of the shared set.
 fn report(args: &Args, scans: u64, sender: &mut Sender) -> anyhow::Result<()> {
     let (counts, robot) = (sender.counts(), args.robot[0].to_string());
     let (voxels, digest) = (sender.sent().len(), sender.sent().digest());
@@ -187,8 +187,8 @@ mod tests {
     fn endless_requests_end_at_the_deadline() {
         let (stop, most) = (AtomicBool::new(false), Duration::from_secs(30));
         let begin = Instant::now();
-        let came = asks(begin + STEP, &stop, |_| (begin.elapsed() < most).then(ask)).count();
-        assert!(came > 0 && begin.elapsed() < most);
+        let received = asks(begin + STEP, &stop, |_| (begin.elapsed() < most).then(ask)).count();
+        assert!(received > 0 && begin.elapsed() < most);
     }
 
     #[test]

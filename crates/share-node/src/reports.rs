@@ -29,7 +29,7 @@ pub enum Kind {
     Ask,
 }
 
-/// Maximum number of reports: anyone can invent robot names.
+/// Maximum number of reports, because anyone can invent robot names.
 const MAX_REPORTS: usize = 1000;
 
 impl Reports {

@@ -159,7 +159,7 @@ impl Subscriber<'_> {
         true
     }
 
-    /// Removes the robot that has waited longest without a status: anyone can invent robot names.
+    /// Removes the robot that has waited longest without a status, because anyone can invent robot names.
     fn dismiss_unknown(&mut self) {
         let unknown = self.robots.iter().filter(|(robot, _)| !self.is_known(robot));
         let longest = unknown.min_by_key(|(_, waiting)| waiting.since).map(|(robot, _)| robot.clone());
@@ -280,7 +280,7 @@ impl Subscriber<'_> {
                 let state = if is_equal { "equal to the robot's" } else { "not known to be equal" };
                 let (bytes, ask_bytes) = (counts.bytes, counts.ask_bytes);
                 lines.push(format!("{name}: {voxels} voxels, digest {digest}, {state}"));
-                lines.push(format!("received  {bytes} bytes, asked {ask_bytes} bytes"));
+                lines.push(format!("received  {bytes} bytes, requested with {ask_bytes} bytes"));
             }
         }
         // Print last: a closed or full output must not prevent folding.
@@ -296,10 +296,10 @@ impl Subscriber<'_> {
     }
 }
 
-/// Folds a layer into a map. The map may use the memory that the layer leaves.
+/// Folds a layer into a map. The map gets the memory limit minus the size of the layer.
 fn fold(map: &Path, grid: &Grid, layer: &VoxelSet, memory_bytes: usize) -> anyhow::Result<()> {
     if grid.resolution_m().to_bits() != layer.grid().resolution_m().to_bits() {
-        bail!("has {}, but the map has {}", lengths(layer.grid()), lengths(grid));
+        bail!("the layer has {}, but the map has {}", lengths(layer.grid()), lengths(grid));
     }
     let mut mapper = open_map(map, grid, memory_bytes.saturating_sub(layer.memory_bytes()))?;
     merge_layer(layer, &mut mapper)?;

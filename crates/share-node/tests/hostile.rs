@@ -196,7 +196,7 @@ fn a_fault_of_one_robot_does_not_affect_others() {
         }
     }
     stop(&subscriber);
-    let (came, is_success) = layers_and_success(&mut subscriber);
+    let (received, is_success) = layers_and_success(&mut subscriber);
     let mut errors = String::new();
     subscriber.0.stderr.as_mut().unwrap().read_to_string(&mut errors).unwrap();
     println!("{errors}");
@@ -212,7 +212,7 @@ fn a_fault_of_one_robot_does_not_affect_others() {
         assert!(errors.contains(word), "{word}: {errors}");
     }
     assert_eq!(fs::read(aside(&layers, "damaged")).unwrap(), b"voxtile-layer-1\nand then nothing");
-    let of_honest = came.iter().find(|layer| layer.0 == "honest").unwrap();
+    let of_honest = received.iter().find(|layer| layer.0 == "honest").unwrap();
     assert_eq!((of_honest.1, &of_honest.2, of_honest.3), (voxels, &digest, true));
     for robot in ["honest", "damaged", "far-away", "other-size"] {
         assert!(layers.join(format!("{robot}.layer")).is_file(), "{robot}");
@@ -260,8 +260,8 @@ fn an_unfolded_layer_is_a_failure_after_the_last_report() {
     }
     std::thread::sleep(Duration::from_secs(5));
     stop(&subscriber);
-    let (came, is_success) = layers_and_success(&mut subscriber);
-    assert_eq!(came.iter().map(|layer| layer.0.as_str()).collect::<Vec<_>>(), ["honest"]);
+    let (received, is_success) = layers_and_success(&mut subscriber);
+    assert_eq!(received.iter().map(|layer| layer.0.as_str()).collect::<Vec<_>>(), ["honest"]);
     assert!(!is_success);
 }
 

@@ -165,8 +165,8 @@ fn errors_on_the_command_line_are_reported() {
         (vec!["--fold", "/nowhere.layer", "-o", "/nowhere"], "/nowhere.layer"),
     ] {
         let output = run(&args);
-        let said = String::from_utf8_lossy(&output.stderr).into_owned();
-        assert!(!output.status.success() && said.contains(word), "{args:?}: {said}");
+        let stderr = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert!(!output.status.success() && stderr.contains(word), "{args:?}: {stderr}");
     }
 }
 

@@ -11,7 +11,7 @@ pub enum Known {
     Unknown,
 }
 
-/// octomap_server's names of fields that have other names here.
+/// Parameter names of octomap_server and the corresponding fields.
 const ALIASES: [(&str, &str); 6] = [
     ("sensor_model.max_range", "max_range"),
     ("sensor_model.min_range", "min_range"),

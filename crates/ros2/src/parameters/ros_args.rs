@@ -1,7 +1,7 @@
 use crate::names::RULE_SEPARATOR;
 use std::ffi::OsString;
 
-/// Command line with the arguments between `--ros-args` and `--`, as in launch files, translated to options.
+/// Command line whose arguments between `--ros-args` and `--` are translated to options.
 #[derive(Debug, Default, PartialEq)]
 pub struct RosArgs {
     /// Command line with the translated options appended.
@@ -13,7 +13,7 @@ pub struct RosArgs {
 const BEGIN: &str = "--ros-args";
 const END: &str = "--";
 
-/// Arguments without effect, with a value and without.
+/// Arguments without effect: those with a value, then those without.
 const WITHOUT_EFFECT: [&str; 5] = ["--log-level", "--log-config-file", "--log-file-name", "--enclave", "-e"];
 const SWITCHES: [&str; 6] = [
     "--enable-rosout-logs",

@@ -13,7 +13,7 @@ pub struct Changing {
     viewers: Viewers,
 }
 
-/// Number of messages that a new subscriber gets from the cache before a complete one.
+/// Number of cached messages, which new subscribers get before a complete one.
 const DEPTH: usize = 10;
 
 impl Changing {
@@ -26,8 +26,8 @@ impl Changing {
         Ok(Self { topic: topic.to_owned(), sender, viewers: Viewers::new(Instant::now()) })
     }
 
-    /// Sends the changes of the occupied voxels in a box, if there are subscribers. Sends all voxels for new
-    /// subscribers, and at an interval.
+    /// Sends the changes of the occupied voxels in a box, if there are subscribers. Sends all occupied voxels to new
+    /// subscribers and at an interval.
     pub fn refresh(
         &mut self,
         version: MapVersion,

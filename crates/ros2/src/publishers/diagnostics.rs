@@ -3,7 +3,7 @@ use crate::health::Health;
 use crate::messages::{DiagnosticArray, DiagnosticStatus, Header, KeyValue, Time};
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
-/// Returns the state of the node and what changed since the previous message.
+/// Returns the diagnostics. Rates and losses are since the previous message.
 pub fn diagnostics(
     node_name: &str,
     health: &Health,

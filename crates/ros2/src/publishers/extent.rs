@@ -5,7 +5,7 @@ use voxtile::{Aabb, Point};
 pub struct Extent {
     /// Half the edge of the box around the sensor.
     pub radius_m: f64,
-    /// Range of heights of published voxels, for outputs that have one.
+    /// Published range of heights, for outputs with a height limit.
     pub heights_m: [f64; 2],
 }
 

@@ -17,7 +17,7 @@ pub struct Viewers {
     whole_at: Instant,
 }
 
-/// Interval between complete messages. If one viewer leaves and another arrives, the count does not show it.
+/// Interval between complete messages: the viewer count does not show that one viewer left and another arrived.
 const WHOLE_EVERY: Duration = Duration::from_secs(30);
 
 impl Viewers {
@@ -36,8 +36,8 @@ impl Viewers {
     pub fn needs_update(&mut self, count: usize, version: MapVersion, now: Instant) -> bool {
         let before = std::mem::replace(&mut self.count, count);
         if count == 0 {
-            // Keep the sent voxels: the next viewer first gets the cached messages, and needs to know which of their
-            // voxels have changed since.
+            // Keep the sent voxels: the next viewer first gets the cached messages and must learn which of their voxels
+            // were removed.
             (self.sent, self.failed) = (None, None);
             return false;
         }

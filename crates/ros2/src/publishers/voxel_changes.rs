@@ -35,9 +35,9 @@ impl VoxelChanges {
                 (None, Some(_)) => Ordering::Greater,
                 (None, None) => return changes,
             };
-            let gone = if order.is_le() { before.next() } else { None };
-            let here = if order.is_ge() { now.next() } else { None };
-            match (gone, here) {
+            let old = if order.is_le() { before.next() } else { None };
+            let new = if order.is_ge() { now.next() } else { None };
+            match (old, new) {
                 (Some(_), Some(voxel)) if is_whole => changes.push((*voxel, VoxelState::Occupied)),
                 (None, Some(voxel)) => changes.push((*voxel, VoxelState::Occupied)),
                 (Some(voxel), None) => {

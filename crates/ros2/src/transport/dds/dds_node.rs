@@ -28,7 +28,7 @@ pub struct DdsNode {
     names: Names,
     rmw: Rmw,
     inbox: Arc<Inbox>,
-    /// Kept alive to keep the node in the graph.
+    /// Keeps the node in the graph.
     _context: Context,
 }
 

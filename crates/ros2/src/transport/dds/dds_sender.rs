@@ -3,7 +3,7 @@ use ros2_client::{Node, Publisher};
 use serde::Serialize;
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// Publisher, and its node to count the subscribers.
+/// Publisher with its node, which counts the subscribers.
 pub struct DdsSender<M: Serialize> {
     pub node: Arc<Mutex<Node>>,
     pub publisher: Publisher<M>,

@@ -3,8 +3,8 @@ use anyhow::anyhow;
 use serde_json::{Value, json};
 use zenoh::Config;
 
-/// Bytes above the largest accepted message. Messages up to this size are counted when refused; Zenoh drops larger
-/// ones.
+/// Margin above the largest accepted message. Messages within it are received and counted as too large; Zenoh drops
+/// larger ones.
 const EXTRA_BYTES: usize = 8 << 20;
 
 /// Returns the configuration of a session in `rmw_zenoh_cpp`: a peer that is discovered through a router, without

@@ -45,7 +45,7 @@ const MAX_REQUEST_BYTES: usize = 1 << 20;
 const HEARTBEAT: Duration = Duration::from_millis(500);
 
 impl ZenohNode {
-    /// Opens the session and announces the node. Retries to reach a missing router without end.
+    /// Opens the session and announces the node. If the router is missing, Zenoh retries without a time limit.
     ///
     /// # Errors
     ///

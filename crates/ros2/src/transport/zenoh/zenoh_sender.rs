@@ -7,7 +7,7 @@ use std::sync::atomic::{AtomicI64, Ordering};
 use zenoh::Wait as _;
 use zenoh_ext::AdvancedPublisher;
 
-/// Publisher with its subscriptions.
+/// Publisher with the subscriptions of its topic.
 pub struct ZenohSender {
     pub publisher: AdvancedPublisher<'static>,
     pub subscribers: Subscribers,
