@@ -214,12 +214,10 @@ fn one_or_more<'de, D: Deserializer<'de>>(parameter: D) -> Result<Vec<String>, D
 }
 
 impl Args {
-    /// Memory for queued clouds, in bytes.
     pub fn queue_bytes(&self) -> usize {
         self.memory_bytes() / 8
     }
 
-    /// Memory for the mapper, in bytes.
     pub fn map_bytes(&self) -> usize {
         self.memory_bytes() - self.queue_bytes() - self.remapping_bytes()
     }

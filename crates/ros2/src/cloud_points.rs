@@ -2,14 +2,12 @@ use voxtile::{Pose, ScanRef};
 use voxtile_formats::RigidPose;
 use voxtile_formats::ros::messages::PointCloud2;
 
-/// Decoded points of a cloud.
 #[derive(Debug)]
 pub struct CloudPoints {
     positions_m: Vec<[f64; 3]>,
     intensities: Option<Vec<f32>>,
 }
 
-/// Memory of a decoded point.
 const BYTES_OF_POINT: usize = size_of::<[f64; 3]>() + size_of::<f32>();
 
 impl CloudPoints {

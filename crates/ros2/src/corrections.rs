@@ -23,7 +23,6 @@ const SAME_STAMP_NS: u64 = 1_000_000;
 /// Stamps that decrease by more than this begin a new run.
 const ANOTHER_RUN_NS: i64 = 2_000_000_000;
 
-/// Scan with a stamp and a pose.
 struct Scan {
     number: u64,
     stamp_ns: i64,

@@ -46,7 +46,6 @@ impl FrameOwners {
         self.frames.contains_key(child)
     }
 
-    /// Records a transform of `child`.
     pub fn note(&mut self, parent: &str, child: &str, publisher: Option<Gid>, is_static: bool) {
         self.taken += 1;
         let owned = Owned { publisher, parent: parent.to_owned(), is_static, last: self.taken };

@@ -50,7 +50,6 @@ impl LiveMap {
         Self { frame, grid, state, local: LocalShare::default() }
     }
 
-    /// Records a mapped scan.
     pub fn note_scan(&self, scan_number: u64, sensor_m: Point, stamp_ns: i64) {
         let moment = &mut self.lock().moment;
         let version = MapVersion { scan_number, ..moment.version };
@@ -93,7 +92,6 @@ impl LiveMap {
         self.reader().view()
     }
 
-    /// Returns a reader for queries.
     pub fn reader(&self) -> LiveReader {
         self.lock().reader.clone()
     }

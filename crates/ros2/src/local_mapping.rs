@@ -45,7 +45,6 @@ impl LocalMapping {
         self.map = None;
     }
 
-    /// Inserts a scan that the map has accepted.
     pub fn insert(&mut self, scan: &dyn ScanPoints) {
         if let Some(map) = &mut self.map
             && let Err(error) = map.insert_points(scan)
@@ -54,7 +53,6 @@ impl LocalMapping {
         }
     }
 
-    /// Returns the memory of the local map in bytes.
     pub fn bytes(&self) -> usize {
         self.map.as_ref().map_or(0, LocalMap::bytes)
     }

@@ -19,7 +19,6 @@ impl LocalShare {
         self.is_wanted.load(Ordering::Relaxed)
     }
 
-    /// Replaces the local map.
     pub fn set(&self, reader: Option<LocalReader>) {
         *self.reader.lock().unwrap_or_else(PoisonError::into_inner) = reader;
     }

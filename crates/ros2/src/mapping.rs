@@ -36,7 +36,6 @@ pub struct Mapping {
     /// Corrected path, with the last scan before its arrival. That scan must be durable before remapping begins.
     path: Option<(u64, Vec<StampedPose>)>,
     remapping: Option<Remapping>,
-    /// Memory of a remapping.
     remapping_bytes: usize,
     folder: PathBuf,
     /// Paths that move scans by at most this many metres are ignored.
@@ -248,7 +247,6 @@ impl Mapping {
         Err(error.into())
     }
 
-    /// Executes or begins a service request.
     fn execute(mut self, placed: PlacedOrder) -> anyhow::Result<Self> {
         let order = placed.order.clone();
         match order {
@@ -303,7 +301,6 @@ impl Mapping {
         Ok(self)
     }
 
-    /// Returns whether a path waits for a flush.
     fn awaits_flush(&mut self) -> bool {
         let (scan, durable) = (self.mapper.scan_number(), self.mapper.flushed_scan_number());
         match &mut self.remapping {

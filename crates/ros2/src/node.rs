@@ -10,7 +10,6 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
 use voxtile_formats::ros::messages::MessageKind;
 
-/// Running node: threads and transport.
 pub struct RunningNode {
     publishing: JoinHandle<()>,
     stop: Arc<AtomicBool>,

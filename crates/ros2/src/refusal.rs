@@ -26,7 +26,6 @@ impl Refusal {
         })
     }
 
-    /// Counts a refused cloud.
     pub fn count(self, counters: &mut Counters) {
         let count = match self {
             Self::Malformed => &mut counters.malformed,

@@ -10,7 +10,6 @@ pub struct StampCheck {
     children: HashMap<String, Child>,
 }
 
-/// State of a child frame.
 #[derive(Clone, Copy, Debug, Default)]
 struct Child {
     newest_ns: Option<i64>,

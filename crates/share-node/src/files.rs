@@ -72,7 +72,6 @@ pub fn open_map(folder: &Path, grid: &Grid, memory_bytes: usize) -> anyhow::Resu
     }
 }
 
-/// Describes the lengths of a grid for messages.
 pub fn lengths(grid: &Grid) -> String {
     format!("voxels of {} m and tiles of {} m", grid.resolution_m(), grid.tile_size_m())
 }

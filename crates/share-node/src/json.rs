@@ -19,7 +19,6 @@ pub fn print(object: &impl Serialize) -> anyhow::Result<()> {
     Ok(output::print(line(object)?)?)
 }
 
-/// Returns an object as one line of JSON.
 pub fn line(object: &impl Serialize) -> serde_json::Result<String> {
     serde_json::to_string(&Versioned { version: VERSION, object })
 }

@@ -63,7 +63,6 @@ pub fn run(args: &Args, scans: &[PathBuf]) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Result of one run.
 #[derive(serde::Serialize)]
 struct Row {
     set: String,

@@ -82,7 +82,6 @@ fn asks(
     })
 }
 
-/// Source of voxels.
 enum Feed {
     Map(Box<MapReader>),
     Scans { source: Box<dyn ScanSource>, mapper: Box<InMemoryMapper>, is_over: bool },

@@ -55,7 +55,6 @@ impl Reports {
         self.reported.remove(&(robot.clone(), kind));
     }
 
-    /// Returns the messages about a robot.
     pub fn of<'a>(&'a self, robot: &'a RobotName) -> impl Iterator<Item = &'a str> {
         self.reported.iter().filter(move |((name, _), _)| name == robot).map(|(_, text)| text.as_str())
     }

@@ -59,7 +59,6 @@ impl PointCloud2 {
         Self::of_data(header, ["x", "y", "z"].map(field).to_vec(), 1, vec![1; points as usize])
     }
 
-    /// Returns the serialized message.
     #[cfg(test)]
     pub fn cdr(&self) -> Vec<u8> {
         let body = cdr_encoding::to_vec::<_, byteorder::LittleEndian>(self).unwrap();

@@ -1,7 +1,6 @@
 use crate::args::Args;
 use clap::CommandFactory as _;
 
-/// Meaning of a parameter name.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Known {
     /// Field of [`Args`].
@@ -54,7 +53,6 @@ impl Known {
     }
 }
 
-/// Returns the fields that files may set.
 fn fields() -> Vec<String> {
     let command = Args::command();
     let fields = command.get_arguments().map(|arg| arg.get_id().to_string());

@@ -67,7 +67,6 @@ fn given_by(arguments: &[OsString], parameters: Vec<[String; 2]>) -> Result<BTre
     Ok(given)
 }
 
-/// Returns the full name of the node.
 fn node_of(named: &ArgMatches) -> String {
     let text = |id| named.try_get_one::<String>(id).ok().flatten().cloned().unwrap_or_default();
     format!("{}/{}", text("namespace"), text("node_name"))

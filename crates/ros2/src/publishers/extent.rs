@@ -10,7 +10,6 @@ pub struct Extent {
 }
 
 impl Extent {
-    /// Returns the box around a point.
     pub fn around(&self, center_m: Point) -> Aabb {
         Aabb { min: center_m.map(|at| at - self.radius_m), max: center_m.map(|at| at + self.radius_m) }
     }

@@ -18,7 +18,6 @@ impl<M: Serialize> Outlet<M> {
         Ok(Self { topic: topic.to_owned(), sender, sent: None })
     }
 
-    /// Returns whether the topic has subscribers.
     pub fn is_wanted(&self) -> bool {
         self.sender.subscribers() > 0
     }

@@ -76,7 +76,6 @@ impl Publishing {
         })
     }
 
-    /// Publishes until stopped.
     pub fn run(&mut self, stop: &AtomicBool) {
         let mut begun = Instant::now();
         while !stop.load(Ordering::Relaxed) {

@@ -18,7 +18,6 @@ pub fn around_sensor(map: &LiveMap, extent: &Extent, format: OctreeFormat, _: Em
     OctomapResponse { map }
 }
 
-/// Returns the octree of a box.
 pub fn in_box(map: &LiveMap, request: OctomapInBoxRequest) -> OctomapInBoxResponse {
     let OctomapInBoxRequest { min, max, binary } = request;
     let format = if binary { OctreeFormat::Bt } else { OctreeFormat::Ot };

@@ -15,7 +15,6 @@ pub struct Orders(SyncSender<PlacedOrder>);
 /// Capacity of the queue. When it is full, senders block.
 const MAX_WAITING: usize = 16;
 
-/// Creates the queue of orders.
 pub fn orders() -> (Orders, Receiver<PlacedOrder>) {
     let (sender, receiver) = sync_channel(MAX_WAITING);
     (Orders(sender), receiver)
@@ -36,7 +35,6 @@ impl Orders {
 }
 
 impl PlacedOrder {
-    /// Sends the answer to the caller.
     pub fn answer(self, answer: Result<String, String>) {
         // The caller may have stopped waiting.
         let _ = self.answer.send(answer);

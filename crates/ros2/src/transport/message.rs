@@ -1,6 +1,5 @@
 use std::fmt;
 
-/// Message received on a topic.
 #[derive(Clone, Debug)]
 pub struct Message {
     /// CDR bytes with the four-byte encoding header.

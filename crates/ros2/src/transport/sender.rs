@@ -11,7 +11,6 @@ pub enum Sender<M: Serialize> {
 }
 
 impl<M: Serialize> Sender<M> {
-    /// Returns the number of subscribers.
     pub fn subscribers(&self) -> usize {
         match self {
             Self::Dds(sender) => sender.subscribers(),

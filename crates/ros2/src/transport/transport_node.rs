@@ -86,7 +86,6 @@ impl Transport {
         }
     }
 
-    /// Leaves the ROS graph.
     pub fn leave(self) {
         match self {
             Self::Dds(_) => {}

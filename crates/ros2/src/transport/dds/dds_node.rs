@@ -20,7 +20,6 @@ use serde::Serialize;
 use std::net::{IpAddr, Ipv4Addr};
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// Node in a DDS domain.
 pub struct DdsNode {
     participant: DomainParticipant,
     subscriber: Subscriber,

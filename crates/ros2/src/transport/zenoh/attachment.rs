@@ -15,7 +15,6 @@ pub const GID_BYTES: usize = 16;
 pub const BYTES: usize = 8 + 8 + 1 + GID_BYTES;
 
 impl Attachment {
-    /// Returns an attachment with the current time.
     pub fn now(number: i64, gid: [u8; GID_BYTES]) -> Self {
         let since = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
         Self { number, sent_at_ns: i64::try_from(since.as_nanos()).unwrap_or(i64::MAX), gid }

@@ -71,7 +71,6 @@ impl GraphName {
         format!("{}/0/NN/{}", self.start(), self.end())
     }
 
-    /// Returns the token of an endpoint.
     pub fn token_of(&self, entity: usize, end: End, channel: &Channel, qos: Qos) -> String {
         let end = match end {
             End::Publisher => "MP",

@@ -24,13 +24,11 @@ use zenoh_ext::{
     MissDetectionConfig, RecoveryConfig,
 };
 
-/// Node in the graph of `rmw_zenoh_cpp`.
 pub struct ZenohNode {
     session: Session,
     name: GraphName,
     names: Names,
     inbox: Arc<Inbox>,
-    /// Maximum size of a message.
     max_bytes: usize,
     tokens: Vec<LivelinessToken>,
     /// Callbacks that stop the reader threads.
