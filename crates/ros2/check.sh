@@ -1,18 +1,18 @@
 #!/usr/bin/env bash
-# The node beside an independent peer (Cyclone DDS from PyPI; for zenoh, eclipse-zenoh), over loopback: the map of the
-# node and the map that `voxtile build` makes of the same messages have one digest, with a hostile peer too; what the
-# node publishes is what `voxtile export` writes, and its services do what they say. Without Python or PyPI it says so
-# and passes. The kind rclpy is ROS 2 itself: rclpy of Jazzy over Fast DDS, from PyPI (for Python 3.11).
+# Tests the node with an independent peer over loopback (Cyclone DDS from PyPI; for zenoh, eclipse-zenoh). The map of
+# the node and the map that `voxtile build` creates from the same messages must have the same digest, even with a
+# hostile peer. Outputs must equal those of `voxtile export`; services are also called. Passes with a message if Python
+# or PyPI is missing. The kind rclpy uses ROS 2 itself: rclpy of Jazzy over Fast DDS, from PyPI (for Python 3.11).
 #
 # check.sh [friendly] [hostile] [types] [variants] [odometry] [launch] [path] [real] [sensors] [flood] [rclpy] [zenoh]
 #
-# VOXTILE_ROS2_PYTHON names a Python that has the packages, VOXTILE_ZENOH_PYTHON one that has eclipse-zenoh too,
-# VOXTILE_RCLPY_PYTHON one that has rclpy too; VOXTILE and VOXTILE_ROS2 name programs that are built, VOXTILE_ROS2_ZENOH
-# the node with the feature `zenoh`.
+# VOXTILE_ROS2_PYTHON is a Python with the packages, VOXTILE_ZENOH_PYTHON one with eclipse-zenoh as well,
+# VOXTILE_RCLPY_PYTHON one with rclpy as well. VOXTILE and VOXTILE_ROS2 are built programs, VOXTILE_ROS2_ZENOH is the
+# node with the feature `zenoh`.
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 
-# Some of the kinds run in folders of their own.
+# Some of the kinds run in other folders, so make the path absolute.
 built=$(realpath -m "${CARGO_TARGET_DIR:-target}")/debug
 work=$(mktemp -d)
 node= listener=
@@ -24,7 +24,7 @@ if [ -z "$python" ]; then
     packages="cyclonedds==11.0.1 eclipse-zenoh zenoh-ros2-sdk rosbags numpy"
     # shellcheck disable=SC2086
     if ! { python3 -m venv "$work/venv" && "$python" -m pip -q install $packages; }; then
-        echo "skipped: no Python with cyclonedds and rosbags; name one with VOXTILE_ROS2_PYTHON"
+        echo "skipped: no Python with cyclonedds and rosbags; set VOXTILE_ROS2_PYTHON"
         exit 0
     fi
 fi
@@ -44,7 +44,7 @@ radius=2.5 max_z=1.0 inflation_range=2.2
 outputs="--max-range 60 --publish-every 0.2 --publish-radius $radius --projected-radius 30 --occupancy-max-z $max_z"
 outputs="$outputs --inflation-range $inflation_range"
 
-# What the kind is about, with all that the node has to tell about it.
+# Prints the failure and the log of the node.
 fail() {
     echo "$kind: $*"
     cat "$work/$kind.log"
@@ -57,27 +57,27 @@ start() {
     node=$!
 }
 
-# Ends it with a signal.
+# Stops the node with a signal.
 end() {
     kill "-$1" "$node"
-    wait "$node" || fail "the node has failed"
+    wait "$node" || fail "the node failed"
     node=
 }
 
-# Writes down for so many seconds what the node publishes under these names.
+# Records what the node publishes on these topics for this number of seconds.
 listen() {
     "$python" crates/ros2/tests/outputs.py listen $domain "$work/$kind.outputs" "$@" &
     listener=$!
 }
 
-# Plays the messages to the node, into the map and the log of this name.
+# Plays the messages of a kind to the node.
 play() {
     case $kind in
     odometry) start --resolution $resolution $outputs --odometry /odom --frame-id odom ;;
     path) start --resolution $resolution --max-range 60 --publish-every 0.2 --path /slam_path --flush-every 2 ;;
     sensors) start --resolution $resolution $outputs --cloud /cloud_in --cloud /rear ;;
     launch)
-        # As `ros2 launch` starts a node with a namespace, a name, parameters and remappings.
+        # Starts the node as `ros2 launch` does, with a namespace, a name, parameters and remappings.
         printf '/robot/mapper:\n  ros__parameters: {max_range: 60.0, resolution: 0.7}\n' >"$work/launch.yaml"
         start --publish-every 0.2 --ros-args -r __node:=mapper -r __ns:=/robot --params-file "$work/launch.yaml" \
             -p resolution:=$resolution -r cloud_in:=/cloud_in -r octomap_binary:=/hall/octomap_binary
@@ -98,30 +98,29 @@ play() {
     grep 'clouds:' "$work/$kind.log" | tail -1 | tee "$work/$kind.counters"
 }
 
-# The node and the command make one map of the clouds of a topic.
+# Builds a map from the recorded messages.
 built_of() {
     "$voxtile" build "$work/$kind.bag" "$@" --resolution $resolution --tile-size 10 --max-range 60 >/dev/null
 }
 
-# More clouds than the queue takes are counted, take no more memory than they may, and the node maps on.
+# Sends more clouds than the queue holds: they are counted, memory remains bounded, and the node continues to map.
 flood() {
     local clouds=1500 grown received dropped waiting mapped_before mapped without
     start --memory 128MiB --transform-wait 100 --resolution 0.1
-    "$python" crates/ros2/tests/flood.py $domain $clouds $node >"$work/flood.counts" || fail "the peer has failed"
+    "$python" crates/ros2/tests/flood.py $domain $clouds $node >"$work/flood.counts" || fail "the peer failed"
     end INT
     read -r grown received dropped waiting mapped_before mapped without <"$work/flood.counts"
     echo "flood: $received received, $dropped dropped, $waiting waited, $mapped mapped; $((grown >> 20)) MiB more"
-    [ "$mapped_before" = 0 ] || fail "clouds without transforms are mapped"
-    [ "$received" -gt 600 ] || { echo "skipped: this machine has lost most of the flood on the way"; return; }
-    [ "$dropped" -gt 0 ] || fail "16 MiB hold all of it"
-    [ $((dropped + waiting)) = "$received" ] || fail "some were not counted"
-    # The queue's 16 MiB, the 8 MiB of the socket, and what rustdds holds.
-    [ "$grown" -lt $((64 << 20)) ] || fail "$grown bytes more"
-    [ $((mapped + without)) = "$waiting" ] && [ "$mapped" -gt 0 ] || fail "those that waited are not mapped"
+    [ "$mapped_before" = 0 ] || fail "clouds without transforms were mapped"
+    [ "$received" -gt 600 ] || { echo "skipped: most of the flood was lost in transit"; return; }
+    [ "$dropped" -gt 0 ] || fail "the queue of 16 MiB dropped nothing"
+    [ $((dropped + waiting)) = "$received" ] || fail "some clouds were not counted"
+    # The limit covers the queue (16 MiB), the socket buffer (8 MiB) and the caches of rustdds.
+    [ "$grown" -lt $((64 << 20)) ] || fail "memory grew by $grown bytes"
+    [ $((mapped + without)) = "$waiting" ] && [ "$mapped" -gt 0 ] || fail "the waiting clouds were not mapped"
 }
 
-# Nodes of ROS 2 itself, with its default middleware, get what the node publishes and what it answers, and it gets what
-# they publish.
+# Exchanges messages and service calls with nodes of ROS 2 itself and its default middleware.
 rclpy() {
     local python=${VOXTILE_RCLPY_PYTHON:-$work/venv_ros/bin/python}
     if [ -z "${VOXTILE_RCLPY_PYTHON:-}" ]; then
@@ -129,7 +128,7 @@ rclpy() {
         # shellcheck disable=SC2046,SC2086
         if ! { python3 -m venv "$work/venv_ros" && "$python" -m pip -q install cyclonedds==11.0.1 rosbags numpy \
             $(printf 'ros-jazzy-%s ' $packages); }; then
-            echo "skipped: no Python with rclpy; name one with VOXTILE_RCLPY_PYTHON"
+            echo "skipped: no Python with rclpy; set VOXTILE_RCLPY_PYTHON"
             return
         fi
     fi
@@ -138,26 +137,26 @@ rclpy() {
         rm -rf "$map" "$map.saved" "$work/rclpy.bag"
         start --resolution $resolution $outputs --odometry /odom --frame-id odom
         "$python" crates/ros2/tests/rclpy_peer.py $domain "$work/rclpy.bag" $count "$voxtile" "$map" $radius $max_z ||
-            fail "the peer has failed"
+            fail "the peer failed"
         end INT
         if grep -q " $count mapped" "$work/rclpy.log"; then break; fi
-        grep -q "clouds: $count received" "$work/rclpy.log" && fail "all clouds came, and not all were mapped"
+        grep -q "clouds: $count received" "$work/rclpy.log" && fail "all clouds were received, but not all were mapped"
         if [ $attempt = 3 ]; then
-            echo "skipped: this machine has lost clouds on the way, three times"
+            echo "skipped: clouds were lost in transit three times"
             return
         fi
     done
     built_of -o "$map.built" --odometry /odom
     of_node=$("$voxtile" digest "$map.saved") of_bag=$("$voxtile" digest "$map.built")
-    [ "$of_node" = "$of_bag" ] || fail "the map of the node is another one: $of_node, not $of_bag"
+    [ "$of_node" = "$of_bag" ] || fail "the map of the node differs: $of_node, not $of_bag"
     echo "rclpy: $of_node"
 }
 
-# The node is built once more: the feature is off by default.
+# Builds the node with the feature `zenoh`, which is off by default.
 zenoh() {
     local python=${VOXTILE_ZENOH_PYTHON:-$python} program=${VOXTILE_ROS2_ZENOH:-}
     if ! "$python" -c 'import zenoh, zenoh.ext, cyclonedds, rosbags' 2>/dev/null; then
-        echo "skipped: no Python with eclipse-zenoh; name one with VOXTILE_ZENOH_PYTHON"
+        echo "skipped: no Python with eclipse-zenoh; set VOXTILE_ZENOH_PYTHON"
         return
     fi
     if [ -z "$program" ]; then
@@ -169,7 +168,7 @@ zenoh() {
     crates/ros2/tests/zenoh.sh "$work"
 }
 
-# A street of real clouds where they are at hand.
+# Folder of real clouds, if available.
 street=${VOXTILE_DATA:-../shared/data}/mulran_riverside02_a
 for kind in ${*:-friendly hostile types variants odometry launch path real sensors flood rclpy zenoh}; do
     map=$work/$kind count=30 resolution=0.1 seconds=12
@@ -192,7 +191,7 @@ for kind in ${*:-friendly hostile types variants odometry launch path real senso
     sensors) sent=60 ;;
     path) sent=50 ;;
     esac
-    # Clouds are best effort: a machine that is busy enough loses some on the way, which is no fault of the node.
+    # Clouds are best effort: a busy machine loses some in transit, which is no failure of the node.
     mapped=$([ $kind = hostile ] && echo $count || echo $sent)
     for attempt in 1 2 3; do
         domain=$((RANDOM % 100 + 100))
@@ -200,28 +199,29 @@ for kind in ${*:-friendly hostile types variants odometry launch path real senso
         play
         if grep -q " $mapped mapped" "$work/$kind.counters"; then break; fi
         if grep -q "clouds: $sent received" "$work/$kind.counters"; then
-            fail "all clouds came, and not all were mapped"
+            fail "all clouds were received, but not all were mapped"
         fi
         if [ $attempt = 3 ]; then
-            echo "skipped: this machine has lost clouds on the way, three times"
+            echo "skipped: clouds were lost in transit three times"
             exit 0
         fi
     done
     case $kind in
     sensors)
-        # Of two sensors far apart the order does not matter: voxel by voxel there is the map of each.
+        # The clouds of the two sensors do not overlap, so their order does not matter: the map is the union of two
+        # maps.
         for topic in cloud_in rear; do
             built_of -o "$map.$topic" --topic /$topic
             "$voxtile" export "$map.$topic" -o "$map.$topic.csv" --what all >/dev/null
         done
         "$voxtile" export "$map" -o "$map.csv" --what all >/dev/null
-        cmp <(sort "$map.csv") <(sort -u "$map.cloud_in.csv" "$map.rear.csv") || fail "the map is another one"
+        cmp <(sort "$map.csv") <(sort -u "$map.cloud_in.csv" "$map.rear.csv") || fail "the map differs"
         echo "sensors: $(wc -l <"$map.cloud_in.csv") and $(wc -l <"$map.rear.csv") rows in one map"
         continue
         ;;
     odometry) built_of -o "$map.built" --odometry /odom ;;
     path)
-        # The path is about the first clouds alone; those behind it keep their poses.
+        # The path covers only the first clouds; later ones keep their poses.
         built_of -o "$map.built" --keep-scans --count $count
         before=$("$voxtile" digest "$map.built")
         "$voxtile" remap "$map.built" --poses "$work/$kind.bag.tum" >/dev/null
@@ -236,9 +236,9 @@ for kind in ${*:-friendly hostile types variants odometry launch path real senso
         [ "$(grep -c 'which closes a loop\|has two parents' "$work/$kind.log")" -le 6 ] || fail "too many warnings"
     fi
     of_node=$("$voxtile" digest "$map") of_bag=$("$voxtile" digest "$map.built")
-    [ "$of_node" = "$of_bag" ] || fail "the map of the node is another one: $of_node, not $of_bag"
+    [ "$of_node" = "$of_bag" ] || fail "the map of the node differs: $of_node, not $of_bag"
     if [ $kind = path ]; then
-        # What moved was published, and no scan was mapped twice.
+        # The remapped tiles were published, and no scan was mapped twice.
         grep -q 'remapped: 30 of' "$work/$kind.log" || fail "nothing was remapped"
         "$voxtile" export "$map" -o "$map.csv" --what all >/dev/null
         "$python" crates/ros2/tests/outputs.py whole "$work/$kind.outputs" "$map.csv"
@@ -249,7 +249,7 @@ for kind in ${*:-friendly hostile types variants odometry launch path real senso
         for name in robot/octomap_full hall/octomap_binary; do
             grep -q "\"$name\"" "$work/$kind.outputs" || fail "nothing is published as /$name"
         done
-        grep -q '"octomap_binary":' "$work/$kind.outputs" && fail "names are not mapped"
+        grep -q '"octomap_binary":' "$work/$kind.outputs" && fail "a name was not remapped"
         echo "$kind: $of_node"
         continue
     fi
@@ -264,24 +264,24 @@ for kind in ${*:-friendly hostile types variants odometry launch path real senso
             "$work/$kind.outputs" "$map.csv" "$map.pgm" $count $radius $max_z $1 $inflation_range
     }
     compare live
-    # The map is there to go on with, and nothing that did not come changes it. Who listens gets it, once.
+    # The node continues the map. Without new clouds the map does not change, and each topic is published once.
     start --rmw cyclonedds $outputs
     listen 4
     wait "$listener"
     listener=
     compare rest
     if grep -q '"count": [^1]' "$work/$kind.outputs"; then
-        echo "$kind: what did not change was published again"
+        echo "$kind: an unchanged message was published again"
         exit 1
     fi
     [ $kind = real ] || "$python" crates/ros2/tests/services.py $domain || fail "services"
     end TERM
-    grep -q "the map is at scan $count" "$work/$kind.log" || fail "scans are missing"
-    [ "$("$voxtile" digest "$map")" = "$of_node" ] || fail "starting again changes the map"
-    # However points are laid out, and whoever else talks, it is one map.
+    grep -q "map at scan $count" "$work/$kind.log" || fail "scans are missing"
+    [ "$("$voxtile" digest "$map")" = "$of_node" ] || fail "a restart changes the map"
+    # Point layouts and additional senders do not affect the map.
     [ $kind = friendly ] && of_friend=$of_node
     if [ $kind != real ] && [ "$of_node" != "${of_friend:-$of_node}" ]; then
-        fail "another map than without: $of_node, not $of_friend"
+        fail "the map differs from that of friendly: $of_node, not $of_friend"
     fi
     echo "$kind: $of_node"
 done

@@ -2,29 +2,27 @@ use voxtile::{Pose, ScanRef};
 use voxtile_formats::RigidPose;
 use voxtile_formats::ros::messages::PointCloud2;
 
-/// The points of a cloud, as they are mapped.
 #[derive(Debug)]
 pub struct CloudPoints {
     positions_m: Vec<[f64; 3]>,
     intensities: Option<Vec<f32>>,
 }
 
-/// Bytes of memory of a point.
 const BYTES_OF_POINT: usize = size_of::<[f64; 3]>() + size_of::<f32>();
 
 impl CloudPoints {
-    /// Bytes of memory that the points of a message will take, whatever it takes for them itself.
+    /// Returns the memory of the decoded points of a message, in addition to the message itself.
     pub fn bytes_of(message: &PointCloud2<'_>) -> usize {
         usize::try_from(message.points_claimed()).unwrap_or(usize::MAX).saturating_mul(BYTES_OF_POINT)
     }
 
-    /// Decodes a message that has all points that it claims.
+    /// Decodes a message that contains all points that it claims.
     pub fn of(message: &PointCloud2<'_>) -> Self {
         let count = message.points_claimed() as usize;
         let mut positions_m = Vec::with_capacity(count);
         let mut intensities = message.has_intensities().then(|| Vec::with_capacity(count));
         for point in message.points() {
-            // The origin means that nothing came back.
+            // Store points without a return at the origin.
             positions_m.push(if point.is_return { point.position_m } else { [0.0; 3] });
             if let Some(intensities) = &mut intensities {
                 intensities.push(point.intensity);
@@ -33,11 +31,11 @@ impl CloudPoints {
         Self { positions_m, intensities }
     }
 
-    /// The points as a scan.
+    /// Returns the points as a scan.
     ///
     /// # Errors
     ///
-    /// A pose that is none.
+    /// An invalid pose.
     pub fn scan(&self, world_from_sensor: &RigidPose, stamp_ns: i64) -> voxtile::Result<ScanRef<'_>> {
         let pose = Pose::from_quaternion(world_from_sensor.position_m, world_from_sensor.quaternion)?;
         let scan = ScanRef::in_sensor(pose, &self.positions_m).with_stamp_ns(stamp_ns);
@@ -55,7 +53,7 @@ mod tests {
     use voxtile_formats::ros::Wire;
 
     #[test]
-    fn points_take_no_more_than_was_said() {
+    fn decoded_points_fit_the_estimated_memory() {
         for cdr in [
             messages::PointCloud2::of_bytes(Header::default(), 1100).cdr(),
             messages::PointCloud2::of_points(Header::default(), (0..1101).map(|x| [f64::from(x); 3])).cdr(),

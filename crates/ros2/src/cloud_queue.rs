@@ -4,34 +4,34 @@ use crate::when_behind::WhenBehind;
 use std::collections::VecDeque;
 use voxtile_formats::RigidPose;
 
-/// Clouds that wait, oldest first, in a bounded number of bytes. Decoded points count from the beginning, and those of
-/// the cloud that was taken until the next one is: so all of them have room, whenever they are mapped.
+/// Queue of clouds, oldest first, with bounded memory. The memory of decoded points is reserved from the start. The
+/// reservation of a taken cloud ends when the next one is taken, so decoded points always fit.
 #[derive(Debug)]
 pub struct CloudQueue {
     clouds: VecDeque<Cloud>,
     bytes: usize,
-    /// How many of them are of the cloud that was taken.
+    /// Part of `bytes` that is reserved for the taken cloud.
     taken_bytes: usize,
     most_bytes: usize,
     when_behind: WhenBehind,
-    /// By topic: whether the last one was left out.
+    /// Whether the last cloud of each topic was skipped by `thin`.
     was_thinned: Vec<bool>,
 }
 
-/// What is said of a cloud that waits.
+/// Decision about a queued cloud.
 #[derive(Debug, PartialEq)]
 pub enum Verdict<P> {
-    /// It can be mapped, with this pose.
+    /// The cloud can be mapped with this pose.
     Ready(P),
-    /// Not yet; nor may later ones of its topic pass it.
+    /// The pose may still arrive. Later clouds of the same topic must wait too.
     Waits,
-    /// It never will.
-    Hopeless,
+    /// The pose can no longer arrive.
+    Expired,
 }
 
-/// What a cloud takes beside its bytes: no flood of empty ones is free.
+/// Memory of a cloud in addition to its content, so that empty clouds count too.
 const CLOUD_BYTES: usize = 256;
-/// Of a flood of clouds only the first ones get poses before they are mapped.
+/// Maximum number of clouds that `settle` searches, which bounds its time.
 const MAX_SETTLED: usize = 1000;
 
 impl CloudQueue {
@@ -44,7 +44,7 @@ impl CloudQueue {
         self.clouds.len()
     }
 
-    /// Whether a cloud has to wait for room outside of the queue.
+    /// Returns whether a cloud must wait outside the queue until memory is free.
     pub fn must_wait(&self, cloud: &Cloud) -> bool {
         let needed = self.bytes.saturating_add(bytes_of(cloud));
         self.when_behind == WhenBehind::Wait && self.bytes > 0 && needed > self.most_bytes
@@ -67,7 +67,7 @@ impl CloudQueue {
         }
         while self.bytes + bytes > self.most_bytes {
             counters.dropped_behind += 1;
-            // What is left is of the cloud that is being mapped.
+            // The remaining bytes belong to the taken cloud.
             let Some(oldest) = self.clouds.pop_front() else { return };
             self.bytes -= bytes_of(&oldest);
         }
@@ -75,26 +75,26 @@ impl CloudQueue {
         self.clouds.push_back(cloud);
     }
 
-    /// Gives clouds the poses that are known now, before what they come from is forgotten.
+    /// Stores the poses that are known now in the clouds, before their transforms are discarded.
     pub fn settle(&mut self, pose_of: impl Fn(&Cloud) -> Option<RigidPose>) {
         for cloud in self.clouds.iter_mut().filter(|cloud| cloud.pose.is_none()).take(MAX_SETTLED) {
             cloud.pose = pose_of(cloud);
         }
     }
 
-    /// Gives back the room of the cloud that was taken.
-    pub fn let_go(&mut self) {
+    /// Releases the memory of the taken cloud.
+    pub fn release_taken(&mut self) {
         self.bytes -= std::mem::take(&mut self.taken_bytes);
     }
 
-    /// Takes the first cloud that is ready, and lets go of the one before. Those of one topic keep their order; topics
-    /// do not wait for one another.
+    /// Takes the first cloud that is ready, and releases the cloud taken before. Clouds of a topic keep their order;
+    /// topics do not wait for each other.
     pub fn take_ready<P>(
         &mut self,
         counters: &mut Counters,
         mut verdict: impl FnMut(&Cloud) -> Verdict<P>,
     ) -> Option<(Cloud, P)> {
-        self.let_go();
+        self.release_taken();
         let mut waiting: Vec<usize> = Vec::new();
         let mut at = 0;
         while let Some(cloud) = self.clouds.get(at) {
@@ -107,7 +107,7 @@ impl CloudQueue {
                     waiting.push(cloud.topic);
                     at += 1;
                 }
-                Verdict::Hopeless => {
+                Verdict::Expired => {
                     counters.dropped_without_pose += 1;
                     let cloud = self.clouds.remove(at)?;
                     self.bytes -= bytes_of(&cloud);
@@ -146,7 +146,7 @@ mod tests {
     }
 
     #[test]
-    fn the_oldest_makes_room_and_is_counted() {
+    fn the_oldest_cloud_is_dropped_and_counted() {
         let (mut queue, mut counters) =
             (CloudQueue::new(3000, 1, WhenBehind::DropOldest), Counters::default());
         (0..5).for_each(|stamp| queue.push(cloud(0, stamp), &mut counters));
@@ -156,7 +156,7 @@ mod tests {
     }
 
     #[test]
-    fn a_cloud_larger_than_the_queue_pushes_nothing_out() {
+    fn a_cloud_larger_than_the_queue_displaces_nothing() {
         let (mut queue, mut counters) =
             (CloudQueue::new(1500, 1, WhenBehind::DropOldest), Counters::default());
         queue.push(cloud(0, 1), &mut counters);
@@ -165,7 +165,7 @@ mod tests {
     }
 
     #[test]
-    fn thin_leaves_out_every_second_one_of_a_topic_while_over_half_full() {
+    fn thin_skips_every_second_cloud_of_a_topic_while_over_half_full() {
         let (mut queue, mut counters) = (CloudQueue::new(8000, 2, WhenBehind::Thin), Counters::default());
         (0..9).for_each(|stamp| queue.push(cloud(0, stamp), &mut counters));
         assert_eq!((counters.thinned, counters.dropped_behind), (2, 0));
@@ -173,21 +173,21 @@ mod tests {
     }
 
     #[test]
-    fn wait_asks_for_room_but_takes_one_cloud_always() {
+    fn wait_blocks_when_full_but_always_accepts_one_cloud() {
         let (mut queue, mut counters) = (CloudQueue::new(1500, 1, WhenBehind::Wait), Counters::default());
         assert!(!queue.must_wait(&Cloud { points_bytes: usize::MAX, ..cloud(0, 1) }));
         queue.push(cloud(0, 1), &mut counters);
         assert!(queue.must_wait(&cloud(0, 2)));
         assert!(!CloudQueue::new(1500, 1, WhenBehind::DropOldest).must_wait(&cloud(0, 2)));
-        // It is being mapped, and then it is not.
+        // The cloud is being mapped; then it is released.
         assert_eq!(queue.take_ready(&mut counters, |_| Verdict::Ready(())).unwrap().0.stamp_ns, 1);
         assert!(queue.must_wait(&cloud(0, 2)));
-        queue.let_go();
+        queue.release_taken();
         assert!(!queue.must_wait(&cloud(0, 2)));
     }
 
     #[test]
-    fn points_have_room_before_they_are_decoded_and_while_they_are_mapped() {
+    fn memory_of_points_is_reserved_until_they_are_mapped() {
         let (mut queue, mut counters) =
             (CloudQueue::new(3000, 1, WhenBehind::DropOldest), Counters::default());
         let with_points = |stamp_ns| Cloud { points_bytes: 1000, ..cloud(0, stamp_ns) };
@@ -199,7 +199,7 @@ mod tests {
         assert_eq!((queue.len(), counters.dropped_behind), (1, 1));
         let taken = queue.take_ready(&mut counters, |_| Verdict::Ready(()));
         assert_eq!((taken.unwrap().0.stamp_ns, queue.len()), (4, 0));
-        // The second one has no room beside the one that is being mapped and the first one, and then none beside that.
+        // The second cloud fits neither next to the first and the taken one, nor next to the taken one alone.
         queue.push(cloud(0, 5), &mut counters);
         queue.push(with_points(6), &mut counters);
         assert_eq!((queue.len(), queue.bytes, counters.dropped_behind), (0, 2000, 3));
@@ -210,7 +210,7 @@ mod tests {
     }
 
     #[test]
-    fn a_sensor_that_waits_holds_up_its_own_clouds_alone() {
+    fn a_waiting_sensor_delays_only_its_own_clouds() {
         let (mut queue, mut counters) =
             (CloudQueue::new(1 << 20, 2, WhenBehind::DropOldest), Counters::default());
         for (topic, stamp) in [(0, 1), (0, 2), (1, 3), (1, 4)] {
@@ -219,7 +219,7 @@ mod tests {
         let mut take = |queue: &mut CloudQueue| {
             let taken = queue.take_ready(&mut counters, |cloud| match cloud.stamp_ns {
                 1 => Verdict::Waits,
-                3 => Verdict::Hopeless,
+                3 => Verdict::Expired,
                 stamp => Verdict::Ready(stamp),
             });
             taken.map(|(_, stamp)| stamp)

@@ -3,26 +3,26 @@ use voxtile::mapper::KeptScanHead;
 use voxtile_formats::RigidPose;
 use voxtile_formats::ros::messages::StampedPose;
 
-/// What a corrected path means for the scans of a map: new poses of those that it names, by their stamps, and of those
+/// New poses of a map's scans by a corrected path: of the scans that the path names by their stamps, and of the scans
 /// between them.
 #[derive(Clone, Debug, Default)]
 pub struct Corrections {
-    /// New poses, by the numbers of the scans.
+    /// Number and new pose of each scan.
     pub poses: Vec<(u64, Pose)>,
-    /// Scans that the path names.
+    /// Number of scans that the path names.
     pub named: usize,
-    /// The longest way of a scan, in metres.
+    /// Largest displacement of a scan, in metres.
     pub most_moved_m: f64,
-    /// The largest angle by which a scan turns, in radians.
+    /// Largest rotation of a scan, in radians.
     pub most_turned: f64,
 }
 
-/// A scan and a pose belong together whose stamps differ by no more; paths are often kept in seconds.
+/// Maximum difference between the stamps of a scan and its path pose, because paths are often stored with rounded
+/// seconds.
 const SAME_STAMP_NS: u64 = 1_000_000;
-/// Where stamps go back by more, another run begins.
+/// Stamps that decrease by more than this begin a new run.
 const ANOTHER_RUN_NS: i64 = 2_000_000_000;
 
-/// A scan that can be moved.
 struct Scan {
     number: u64,
     stamp_ns: i64,
@@ -30,12 +30,13 @@ struct Scan {
 }
 
 impl Corrections {
-    /// A scan that the path does not name keeps its place relative to the nearest one, in time, that it names. Scans
-    /// without a stamp or a pose stay, and so do those of earlier runs, which may have the same stamps.
+    /// Computes the corrections. A scan that the path does not name keeps its pose relative to the nearest named scan
+    /// in time. Scans without a stamp or a pose keep their poses, as do scans of earlier runs, whose stamps may be the
+    /// same.
     ///
     /// # Errors
     ///
-    /// Poses that are none.
+    /// Invalid poses.
     pub fn of<'a>(
         records: impl IntoIterator<Item = &'a KeptScanHead>,
         path: &[StampedPose],
@@ -54,7 +55,7 @@ impl Corrections {
                 scans.push(Scan { number: record.number, stamp_ns, world_from_sensor });
             }
         }
-        // Stamp, pose until now and new pose of those that the path names, by stamp.
+        // Stamp, old pose and new pose of the scans that the path names, sorted by stamp.
         let mut named = Vec::new();
         for scan in &scans {
             let pose = nearest(&path, scan.stamp_ns, |(stamp_ns, _)| *stamp_ns);
@@ -90,7 +91,7 @@ impl Corrections {
     }
 }
 
-/// The one nearest in time, of some that are sorted by it.
+/// Returns the item nearest in time from items sorted by time.
 fn nearest<T>(sorted: &[T], stamp_ns: i64, stamp_of: impl Fn(&T) -> i64) -> Option<&T> {
     let after = sorted.partition_point(|one| stamp_of(one) < stamp_ns);
     let around = sorted.get(after.saturating_sub(1)..sorted.len().min(after + 1))?;
@@ -117,11 +118,11 @@ mod tests {
     }
 
     const STRAIGHT: [f64; 4] = [0.0, 0.0, 0.0, 1.0];
-    /// By a quarter to the left, and not normalized.
+    /// Quarter turn to the left, not normalized.
     const LEFT: [f64; 4] = [0.0, 0.0, 2.0, 2.0];
 
     #[test]
-    fn scans_between_keep_the_correction_of_the_nearest_that_is_named() {
+    fn scans_between_follow_the_nearest_named_scan() {
         let s = 1_000_000_000;
         let records = [
             record(1, Some(0), 0.0),
@@ -139,23 +140,23 @@ mod tests {
         assert_eq!(found.named, 2);
         let numbers: Vec<u64> = found.poses.iter().map(|(number, _)| *number).collect();
         assert_eq!(numbers, [1, 2, 3, 4]);
-        let places = found.poses.iter().map(|(_, pose)| pose.position_m());
+        let positions = found.poses.iter().map(|(_, pose)| pose.position_m());
         assert_eq!(
-            places.collect::<Vec<_>>(),
+            positions.collect::<Vec<_>>(),
             [[0.0; 3], [1.0, 0.0, 0.0], [4.0, 0.0, 0.0], [10.0, 5.0, 0.0]]
         );
         assert!(
             (found.most_moved_m - 5.0).abs() < 1e-12 && (found.most_turned.to_degrees() - 90.0).abs() < 1e-9
         );
 
-        // The third is nearer to the fourth now: it is six metres behind it, along its way.
+        // The third scan now follows the fourth, six metres behind it along its heading.
         let found = Corrections::of(&records[2..4], &path).unwrap();
-        let place = found.poses[0].1.position_m();
-        assert!((0..3).all(|k| (place[k] - [10.0, -1.0, 0.0][k]).abs() < 1e-12), "{place:?}");
+        let position = found.poses[0].1.position_m();
+        assert!((0..3).all(|k| (position[k] - [10.0, -1.0, 0.0][k]).abs() < 1e-12), "{position:?}");
     }
 
     #[test]
-    fn scans_of_another_run_stay_though_they_have_the_same_stamps() {
+    fn scans_of_another_run_keep_their_poses_despite_equal_stamps() {
         let s = 1_000_000_000;
         let stamps_s = [0, 1, 2, 3, 0, 2, 1, 4];
         let records: Vec<_> = stamps_s
@@ -167,12 +168,12 @@ mod tests {
         let found = Corrections::of(&records, &path).unwrap();
         let numbers: Vec<u64> = found.poses.iter().map(|(number, _)| *number).collect();
         assert_eq!((found.named, numbers), (1, vec![5, 6, 7, 8]));
-        // Of one run all are moved, whichever node has mapped them.
+        // All scans of one run are moved.
         assert_eq!(Corrections::of(&records[..4], &path).unwrap().poses.len(), 4);
     }
 
     #[test]
-    fn a_path_that_names_no_scan_changes_nothing_and_a_wrong_one_is_refused() {
+    fn a_path_without_known_stamps_changes_nothing_and_invalid_poses_are_refused() {
         let records = [record(1, Some(0), 0.0)];
         let found = Corrections::of(&records, &[pose(2_000_000, [1.0; 3], STRAIGHT)]).unwrap();
         assert_eq!((found.named, found.poses.len()), (0, 0));

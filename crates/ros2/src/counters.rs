@@ -1,31 +1,31 @@
-/// What became of all that came.
+/// Counters of received, mapped and dropped messages.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Counters {
     pub received: u64,
     pub mapped: u64,
-    /// Dropped because mapping was behind.
+    /// Clouds dropped because mapping was too slow.
     pub dropped_behind: u64,
-    /// Left out by `thin`.
+    /// Clouds skipped by `thin`.
     pub thinned: u64,
-    /// No transforms on both sides of their stamp in time, or in the frame of the map already.
+    /// Clouds whose transforms did not arrive in time, and clouds that are already in the map frame.
     pub dropped_without_pose: u64,
-    /// Clouds and transforms that could not be decoded, or not whole.
+    /// Clouds and transforms that could not be decoded completely.
     pub malformed: u64,
-    /// Clouds that are larger than the whole queue, with their points decoded.
+    /// Clouds that exceed the queue with their points decoded.
     pub too_large: u64,
-    /// Clouds for which the map has too little memory.
+    /// Clouds refused because the map has too little memory.
     pub refused_memory: u64,
-    /// Clouds that touch a tile that is damaged on disk.
+    /// Clouds refused because of a damaged tile on disk.
     pub refused_damaged: u64,
-    /// Clouds for which the disk did not do what it was to do.
+    /// Clouds refused because of a disk error.
     pub refused_disk: u64,
-    /// Flushes that were to be tried again.
+    /// Failed flushes, each retried.
     pub failed_flushes: u64,
-    /// Transforms that are not valid, or more than the buffer takes.
+    /// Transforms that are invalid or exceed the buffer.
     pub transforms_refused: u64,
-    /// How often the map followed a corrected path.
+    /// Number of corrected paths that the map followed.
     pub remapped: u64,
-    /// Samples that the transport could not deliver.
+    /// Messages that the transport failed to deliver.
     pub transport_errors: u64,
 }
 
@@ -34,7 +34,7 @@ impl std::fmt::Display for Counters {
         write!(
             f,
             "clouds: {} received, {} mapped, {} dropped behind, {} thinned, {} without a pose, {} malformed, \
-             {} too large, {} refused for want of memory, {} for damaged tiles, {} by the disk; {} flushes failed; \
+             {} too large, {} refused for lack of memory, {} for damaged tiles, {} by the disk; {} flushes failed; \
              {} transforms refused, {} transport errors",
             self.received,
             self.mapped,

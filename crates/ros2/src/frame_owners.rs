@@ -2,12 +2,12 @@ use crate::transport::Gid;
 use std::cmp::Reverse;
 use std::collections::{HashMap, HashSet};
 
-/// Which publisher names which child frames, and in which order they were last named: it chooses the frames to forget,
-/// so that a flood of frames fills a bounded buffer and costs other publishers none of theirs.
+/// Publishers of child frames, in the order of their last transforms. Chooses the frames to drop when the buffer is
+/// full: a flood of frames from one publisher must not displace those of others.
 #[derive(Debug, Default)]
 pub struct FrameOwners {
     frames: HashMap<String, Owned>,
-    /// Number of transforms so far.
+    /// Number of transforms received.
     taken: u64,
 }
 
@@ -16,28 +16,28 @@ struct Owned {
     publisher: Option<Gid>,
     parent: String,
     is_static: bool,
-    /// Number of the last transform.
+    /// Number of the last transform of the frame.
     last: u64,
 }
 
-/// In which order frames of a publisher are forgotten.
+/// Order in which frames of a publisher are dropped.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 enum Rank {
-    /// Sent again and again.
+    /// Sent repeatedly.
     Moving,
     /// Sent once.
     Static,
-    /// Sent once, and mounted on the robot: perhaps a sensor whose clouds start later.
+    /// Sent once and mounted on the robot, for example a sensor whose clouds start later.
     Mounted,
 }
 
-/// So many of the frames of a publisher are forgotten at a time: one of these.
+/// Inverse of the fraction of a publisher's frames that is dropped at a time.
 const PART: usize = 4;
-/// At least so many frames are forgotten at a time, of several publishers if need be: choosing them takes time.
+/// Minimum number of frames dropped at a time, because the selection is slow. Several publishers may be affected.
 const MIN_FORGOTTEN: usize = 100;
 
 impl FrameOwners {
-    /// Number of frames, those whose transforms are forgotten among them.
+    /// Returns the number of frames, including those whose transforms were dropped.
     pub fn len(&self) -> usize {
         self.frames.len()
     }
@@ -46,20 +46,20 @@ impl FrameOwners {
         self.frames.contains_key(child)
     }
 
-    /// Notes a transform of a child.
     pub fn note(&mut self, parent: &str, child: &str, publisher: Option<Gid>, is_static: bool) {
         self.taken += 1;
         let owned = Owned { publisher, parent: parent.to_owned(), is_static, last: self.taken };
         if let Some(known) = self.frames.get_mut(child) {
-            // What was sent once is not sent again because another publisher names it.
+            // A static frame remains static if another publisher sends it: its transform is not repeated.
             *known = Owned { is_static: is_static || known.is_static, ..owned };
         } else {
             self.frames.insert(child.to_owned(), owned);
         }
     }
 
-    /// Forgets some frames that are not needed, and returns them: of the publishers that have most, first moving ones
-    /// and last static ones on needed frames other than the fixed one, of each kind those not named for longest.
+    /// Removes and returns some frames that are not needed. Takes them from the publishers with most frames: moving
+    /// frames first, then static ones, and last static ones mounted on needed frames other than the fixed one. Among
+    /// equals, the least recently named are removed first.
     pub fn forget_some(&mut self, needed: &HashSet<String>, fixed: &str) -> Vec<String> {
         let mounted = self.mounted(needed, fixed);
         let mut publishers: HashMap<Option<Gid>, Vec<(Rank, u64, &str)>> = HashMap::new();
@@ -73,7 +73,7 @@ impl FrameOwners {
         }
         let mut publishers: Vec<_> = publishers.into_values().collect();
         publishers.iter_mut().for_each(|frames| frames.sort_unstable());
-        // Of equally many, first those that were not named for longest.
+        // Among publishers with equally many frames, the one with the oldest frame is first.
         publishers.sort_by_key(|frames| (Reverse(frames.len()), frames.first().copied()));
         let mut forgotten: Vec<String> = Vec::new();
         for frames in publishers {
@@ -89,7 +89,7 @@ impl FrameOwners {
         forgotten
     }
 
-    /// The static frames that needed frames carry, the fixed one aside.
+    /// Returns the static frames mounted on needed frames other than the fixed one.
     fn mounted<'a>(&'a self, needed: &'a HashSet<String>, fixed: &str) -> HashSet<&'a str> {
         let mut children: HashMap<&str, Vec<&str>> = HashMap::new();
         for (child, owned) in self.frames.iter().filter(|(_, owned)| owned.is_static) {
@@ -98,7 +98,7 @@ impl FrameOwners {
         let mut open: Vec<&str> = needed.iter().map(String::as_str).filter(|frame| *frame != fixed).collect();
         let mut mounted = HashSet::new();
         while let Some(frame) = open.pop() {
-            // The fixed frame may be above others, and does not carry what is on it.
+            // The fixed frame may be an ancestor of others; frames on it are not mounted on the robot.
             let carried = children.get(frame).into_iter().flatten().filter(|child| **child != fixed);
             open.extend(carried.filter(|child| mounted.insert(**child)));
         }
@@ -119,7 +119,7 @@ mod tests {
     }
 
     #[test]
-    fn mounts_of_sensors_are_forgotten_last() {
+    fn sensor_mounts_are_dropped_last() {
         let mut owners = FrameOwners::default();
         // The mount is sent once, before all markers of the same publisher.
         owners.note("rig", "camera", gid(1), true);
@@ -137,7 +137,7 @@ mod tests {
     }
 
     #[test]
-    fn many_publishers_of_one_frame_each_lose_many_at_a_time() {
+    fn many_frames_are_dropped_at_a_time_from_publishers_of_one_frame() {
         let mut owners = FrameOwners::default();
         for k in 0..200 {
             owners.note("map", &format!("f{k}"), gid(k), false);

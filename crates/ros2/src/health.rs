@@ -2,18 +2,18 @@ use crate::latencies::Latencies;
 use std::time::Duration;
 use voxtile::mapper::MapStatistics;
 
-/// How the map is, as its mapper sees it about once a second.
+/// State of the map, sampled by its mapper about once a second.
 #[derive(Clone, Debug, Default)]
 pub struct Health {
     pub statistics: MapStatistics,
-    /// Scans that a crash would take away.
+    /// Number of scans that a crash would lose.
     pub unflushed_scans: u64,
-    /// Since the map on disk was last what is in memory, or made newer.
+    /// Time since the map on disk was last complete or last updated by a flush.
     pub flush_age: Duration,
     pub is_flushing: bool,
-    /// Whether the last flush has failed.
+    /// Whether the last flush failed.
     pub has_flush_failed: bool,
-    /// Of the local map, beside the statistics.
+    /// Memory of the local map, not included in the statistics.
     pub local_map_bytes: usize,
     pub latencies: Latencies,
 }

@@ -11,7 +11,7 @@ use voxtile_formats::RigidPose;
 use voxtile_formats::ros::messages::{Header, MessageKind, PointCloud2, StampedPose, decode_poses};
 use voxtile_formats::ros::{Wire, WireError};
 
-/// What readers have for the mapping thread.
+/// Messages from the transport threads for the mapping thread.
 #[derive(Debug)]
 pub struct Inbox {
     state: Mutex<State>,
@@ -23,7 +23,7 @@ struct State {
     queue: CloudQueue,
     transforms: TransformBuffer,
     counters: Counters,
-    /// The last one that came and was not taken.
+    /// Last received path, until it is taken.
     path: Option<Vec<StampedPose>>,
     fixed_frame: String,
     is_closed: bool,
@@ -46,7 +46,7 @@ impl Inbox {
         let (header, points_bytes) = match head {
             Ok(head) => head,
             Err(error) => {
-                log::debug!("a cloud cannot be decoded: {error}");
+                log::debug!("cannot decode a cloud: {error}");
                 state.counters.malformed += 1;
                 return;
             }
@@ -75,14 +75,14 @@ impl Inbox {
                 poses.iter().for_each(&mut insert);
             }
             Err(error) => {
-                log::debug!("transforms cannot be decoded: {error}");
+                log::debug!("cannot decode transforms: {error}");
                 counters.malformed += 1;
             }
         }
         self.changed.notify_all();
     }
 
-    /// A corrected path; it takes the place of one that nobody has taken.
+    /// Stores a corrected path. Replaces a path that is not taken yet.
     pub fn put_path(&self, cdr: &[u8]) {
         let poses = decode_poses(MessageKind::Path, Wire::Cdr, cdr);
         let mut state = self.lock();
@@ -91,11 +91,11 @@ impl Inbox {
                 state.path = Some(poses);
             }
             Ok(_) => {
-                log::warn!("a path is left out: not all of it is in the frame {}", state.fixed_frame);
+                log::warn!("path ignored: some of its poses are not in the frame {}", state.fixed_frame);
                 state.counters.malformed += 1;
             }
             Err(error) => {
-                log::debug!("a path cannot be decoded: {error}");
+                log::debug!("cannot decode a path: {error}");
                 state.counters.malformed += 1;
             }
         }
@@ -105,11 +105,11 @@ impl Inbox {
         self.lock().path.take()
     }
 
-    /// The next cloud that has its pose, waiting for it at most so long.
-    pub fn take(&self, most_wait: Duration) -> Option<(Cloud, RigidPose)> {
+    /// Returns the next cloud with its pose, or `None` after `max_wait`.
+    pub fn take(&self, max_wait: Duration) -> Option<(Cloud, RigidPose)> {
         let mut state = self.lock();
-        // The one before is mapped, and what waits for its room may come in.
-        state.queue.let_go();
+        // The previous cloud is mapped: release its memory and wake readers that wait for it.
+        state.queue.release_taken();
         self.changed.notify_all();
         for is_last in [false, true] {
             let State { queue, transforms, counters, .. } = &mut *state;
@@ -120,7 +120,7 @@ impl Inbox {
                 return taken;
             }
             if !is_last {
-                let waited = self.changed.wait_timeout(state, most_wait);
+                let waited = self.changed.wait_timeout(state, max_wait);
                 state = waited.unwrap_or_else(PoisonError::into_inner).0;
             }
         }
@@ -131,18 +131,18 @@ impl Inbox {
         count(&mut self.lock().counters);
     }
 
-    /// The counters, and the number of clouds that wait.
+    /// Returns the counters and the number of queued clouds.
     pub fn counters(&self) -> (Counters, usize) {
         let state = self.lock();
         (state.counters, state.queue.len())
     }
 
-    /// Why no cloud gets a pose, if that lasts.
-    pub fn pose_trouble(&self) -> Option<String> {
-        self.lock().transforms.trouble()
+    /// Returns the reason why clouds get no pose, if that persists.
+    pub fn pose_problem(&self) -> Option<String> {
+        self.lock().transforms.problem()
     }
 
-    /// As if a sensor stood at the origin of the map.
+    /// Places a sensor at the origin of the map.
     #[cfg(test)]
     pub fn put_mount(&self, frame: &str) {
         let header = crate::messages::Header { frame_id: "map".to_owned(), ..Default::default() };
@@ -152,24 +152,24 @@ impl Inbox {
         self.put_poses(MessageKind::Tf, &Message { cdr, publisher: None }, true);
     }
 
-    /// Lets readers go that wait for room.
+    /// Wakes readers that wait for memory.
     pub fn close(&self) {
         self.lock().is_closed = true;
         self.changed.notify_all();
     }
 
-    /// What a thread that panicked left is still whole: each change is one call.
+    /// Ignores poisoning: each change is one call, so a panicked thread leaves a consistent state.
     fn lock(&self) -> MutexGuard<'_, State> {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
-/// The header of a cloud that has all points that it claims, and the bytes of memory that they will take.
+/// Returns the header of a complete cloud and the memory of its decoded points.
 fn head(cdr: &[u8]) -> Result<(Header, usize), WireError> {
     let cloud = PointCloud2::decode(Wire::Cdr, cdr)?;
-    // No transform will ever name it, and later clouds of its topic would wait behind it.
+    // No transform can match an empty frame, and later clouds of the topic would wait behind this one.
     if cloud.header.frame_id.is_empty() {
-        return Err(WireError { byte: 0, reason: "the cloud names no frame".to_owned() });
+        return Err(WireError { byte: 0, reason: "the cloud has an empty frame_id".to_owned() });
     }
     match cloud.shortage() {
         Some(shortage) => Err(shortage),
@@ -188,15 +188,16 @@ mod tests {
     }
 
     #[test]
-    fn a_cloud_whose_points_take_more_than_the_queue_is_too_large_however_short_it_is() {
+    fn a_short_cloud_whose_decoded_points_exceed_the_queue_is_too_large() {
         let inbox = Inbox::new(&Args::parse_from(["voxtile-ros2", "-o", "map", "--memory", "1MiB"]));
-        // 128 KiB for all.
+        // The queue has 128 KiB.
         inbox.put_cloud(0, messages::PointCloud2::of_bytes(header(), 8000).cdr());
         inbox.put_cloud(0, messages::PointCloud2::of_points(header(), vec![[1.0; 3]; 4000]).cdr());
         assert_eq!((inbox.counters().0.too_large, inbox.counters().1), (2, 0));
         inbox.put_cloud(0, messages::PointCloud2::of_points(header(), vec![[1.0; 3]; 3000]).cdr());
-        let lies = messages::PointCloud2 { width: u32::MAX, ..messages::PointCloud2::of_bytes(header(), 9) };
-        inbox.put_cloud(0, lies.cdr());
+        let invalid =
+            messages::PointCloud2 { width: u32::MAX, ..messages::PointCloud2::of_bytes(header(), 9) };
+        inbox.put_cloud(0, invalid.cdr());
         let (counters, waiting) = inbox.counters();
         assert_eq!((counters.received, counters.too_large, counters.malformed, waiting), (4, 2, 1, 1));
     }
@@ -206,7 +207,7 @@ mod tests {
         let inbox = Inbox::new(&Args::parse_from(["voxtile-ros2", "-o", "map"]));
         let header = messages::Header { frame_id: String::new(), ..header() };
         inbox.put_cloud(0, messages::PointCloud2::of_points(header, vec![[1.0; 3]]).cdr());
-        // All zeros are an empty cloud without fields.
+        // A body of zeros is an empty cloud without fields.
         inbox.put_cloud(0, [&[0, 1, 0, 0][..], &[0; 60]].concat());
         let (counters, waiting) = inbox.counters();
         assert_eq!((counters.received, counters.malformed, waiting), (2, 2, 0));
@@ -226,7 +227,7 @@ mod tests {
     }
 
     #[test]
-    fn what_waits_for_room_comes_in_when_the_cloud_before_is_mapped() {
+    fn a_blocked_cloud_is_accepted_after_the_previous_one_is_mapped() {
         let inbox = Inbox::new(&Args::parse_from([
             "voxtile-ros2",
             "-o",
@@ -240,7 +241,7 @@ mod tests {
         let cloud = messages::PointCloud2::of_points(header(), vec![[1.0; 3]; 3000]).cdr();
         std::thread::scope(|scope| {
             scope.spawn(|| (0..4).for_each(|_| inbox.put_cloud(0, cloud.clone())));
-            // Mapping one takes a while, in which the next one finds no room.
+            // Mapping takes a while, during which the queue is full.
             let taken = (0..40).filter_map(|_| inbox.take(Duration::from_millis(100)));
             let taken = taken.inspect(|_| std::thread::sleep(Duration::from_millis(50))).take(4).count();
             inbox.close();

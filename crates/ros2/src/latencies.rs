@@ -1,21 +1,21 @@
 use std::collections::VecDeque;
 use std::time::Duration;
 
-/// How long the last clouds took from their arrival until the map answers with them.
+/// Times from arrival to completed mapping of the latest clouds.
 #[derive(Clone, Debug, Default)]
 pub struct Latencies(VecDeque<Duration>);
 
-const MOST: usize = 1000;
+const MAX_COUNT: usize = 1000;
 
 impl Latencies {
     pub fn note(&mut self, latency: Duration) {
-        if self.0.len() >= MOST {
+        if self.0.len() >= MAX_COUNT {
             self.0.pop_front();
         }
         self.0.push_back(latency);
     }
 
-    /// The least latency that so many of a hundred clouds do not exceed; none before the first cloud.
+    /// Returns the latency that `percent` of the clouds do not exceed. `None` before the first cloud.
     pub fn percentile(&self, percent: usize) -> Option<Duration> {
         let mut sorted: Vec<Duration> = self.0.iter().copied().collect();
         sorted.sort_unstable();

@@ -4,11 +4,11 @@ use crate::messages::{Header, Time};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use voxtile::{Grid, LiveReader, LiveView, MapView, Point};
 
-/// The map as others than its mapper see it, and where the robot is in it.
+/// Shared read access to the map during mapping, with the last sensor position.
 #[derive(Debug)]
 pub struct LiveMap {
     frame: String,
-    /// The same however often the map is opened anew.
+    /// Does not change when the map is reopened.
     grid: Grid,
     state: Mutex<State>,
     local: LocalShare,
@@ -21,20 +21,20 @@ struct State {
     health: Health,
 }
 
-/// What was known after a scan.
+/// State after a scan.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Moment {
     pub version: MapVersion,
-    /// Of the sensor's last scan, in the frame of the map.
+    /// Sensor position of the last scan, in the map frame.
     pub sensor_m: Point,
-    /// Of that scan.
+    /// Stamp of the last scan.
     pub stamp_ns: i64,
 }
 
-/// What tells one state of the map from another.
+/// Version of the map. Equal versions have equal content.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct MapVersion {
-    /// How often the map was opened anew.
+    /// Number of times the map was reopened.
     pub opening: u64,
     pub scan_number: u64,
 }
@@ -50,14 +50,14 @@ impl LiveMap {
         Self { frame, grid, state, local: LocalShare::default() }
     }
 
-    /// A scan was mapped.
     pub fn note_scan(&self, scan_number: u64, sensor_m: Point, stamp_ns: i64) {
         let moment = &mut self.lock().moment;
         let version = MapVersion { scan_number, ..moment.version };
         *moment = Moment { version, sensor_m, stamp_ns };
     }
 
-    /// The map was changed as a whole, and opened anew; the sensor's last place, where it is another one now.
+    /// Records that the map was changed as a whole and reopened. `sensor_m` is the corrected sensor position, if it
+    /// changed.
     pub fn note_opening(&self, reader: LiveReader, sensor_m: Option<Point>) {
         let scan_number = reader.view().scan_number();
         let mut state = self.lock();
@@ -79,7 +79,6 @@ impl LiveMap {
         &self.grid
     }
 
-    /// The local map beside it.
     pub fn local(&self) -> &LocalShare {
         &self.local
     }
@@ -88,17 +87,16 @@ impl LiveMap {
         self.lock().moment
     }
 
-    /// The map after its last scan. Of a map that is being opened anew, what it was.
+    /// Returns the map after its last scan. While the map is being reopened, returns its previous state.
     pub fn view(&self) -> LiveView {
         self.reader().view()
     }
 
-    /// What answers questions about the map.
     pub fn reader(&self) -> LiveReader {
         self.lock().reader.clone()
     }
 
-    /// For messages about a moment.
+    /// Returns a message header with the stamp of `moment` and the map frame.
     pub fn header(&self, moment: &Moment) -> Header {
         Header { stamp: Time::from_ns(moment.stamp_ns), frame_id: self.frame.clone() }
     }

@@ -3,10 +3,10 @@ use std::sync::Arc;
 use voxtile::{MapView, ScanPoints};
 use voxtile_local::{LocalMap, LocalParameters};
 
-/// The local map beside the map: it takes the same scans, while somebody listens.
+/// Local map of the same scans as the map. It exists while it has subscribers.
 pub struct LocalMapping {
     parameters: LocalParameters,
-    /// Where it starts from what the map knows, around the sensor.
+    /// Distance from the sensor within which the local map is initialized from the map.
     radius_m: f64,
     live: Arc<LiveMap>,
     map: Option<LocalMap>,
@@ -17,44 +17,42 @@ impl LocalMapping {
         Self { parameters, radius_m, live, map: None }
     }
 
-    /// Begins when somebody listens, from what the map knows, and ends when nobody does.
+    /// Creates the local map from the map when a subscriber appears, and drops it when none remains.
     pub fn refresh(&mut self, archive: &(impl MapView + Sized)) {
         match (self.live.local().is_wanted(), &self.map) {
             (true, None) => self.begin(archive),
-            (false, Some(_)) => self.forget(),
+            (false, Some(_)) => self.reset(),
             _ => {}
         }
     }
 
     fn begin(&mut self, archive: &(impl MapView + Sized)) {
-        // Both arguments were checked when the node began.
+        // Both arguments were validated when the node started.
         let Ok(mut map) = LocalMap::new(archive.config().grid.resolution_m(), self.parameters) else {
             return;
         };
         let sensor_m = self.live.moment().sensor_m;
         if let Err(error) = map.prime(archive, sensor_m, self.radius_m) {
-            log::warn!("the local map begins with nothing: {error}");
+            log::warn!("the local map starts empty: {error}");
         }
         self.live.local().set(Some(map.reader()));
         self.map = Some(map);
     }
 
-    /// The map has changed as a whole: what comes next begins from it.
-    pub fn forget(&mut self) {
+    /// Drops the local map after the map changed as a whole. The next refresh creates it again.
+    pub fn reset(&mut self) {
         self.live.local().set(None);
         self.map = None;
     }
 
-    /// Takes a scan that the map has taken.
-    pub fn follow(&mut self, scan: &dyn ScanPoints) {
+    pub fn insert(&mut self, scan: &dyn ScanPoints) {
         if let Some(map) = &mut self.map
             && let Err(error) = map.insert_points(scan)
         {
-            log::warn!("a cloud is not in the local map: {error}");
+            log::warn!("a cloud is missing in the local map: {error}");
         }
     }
 
-    /// Bytes of memory, beside those of the map.
     pub fn bytes(&self) -> usize {
         self.map.as_ref().map_or(0, LocalMap::bytes)
     }
@@ -71,7 +69,7 @@ mod tests {
     }
 
     #[test]
-    fn it_is_there_for_those_who_listen_and_begins_with_what_the_map_knows() {
+    fn the_local_map_exists_for_subscribers_and_starts_from_the_map() {
         let folder = tempfile::tempdir().unwrap();
         let config = MapConfig::new(0.1, 10.0).unwrap();
         let mut mapper = OutOfCoreTileMapper::create(folder.path().join("map"), config).unwrap();
@@ -82,23 +80,23 @@ mod tests {
         let state = |x: f64| live.local().view().map(|view| view.state_at([x, 0.05, 0.05]));
 
         local.refresh(&mapper);
-        local.follow(&scan(3.05));
+        local.insert(&scan(3.05));
         assert_eq!((state(2.05), local.bytes()), (None, 0));
-        live.local().want(true);
+        live.local().set_wanted(true);
         local.refresh(&mapper);
-        // The first hit is occupied still after one miss; what is too far away does not enter.
+        // One miss does not clear the first hit. The voxel beyond the radius is not copied.
         assert_eq!(
             [2.05, 2.25, 8.05].map(state),
             [LocalState::Occupied, LocalState::Inflated, LocalState::None].map(Some)
         );
-        local.follow(&scan(3.05));
+        local.insert(&scan(3.05));
         local.refresh(&mapper);
         assert_eq!(state(3.05), Some(LocalState::Occupied));
-        local.forget();
+        local.reset();
         assert_eq!(state(3.05), None);
         local.refresh(&mapper);
         assert_eq!(state(3.05), Some(LocalState::None));
-        live.local().want(false);
+        live.local().set_wanted(false);
         local.refresh(&mapper);
         assert_eq!((state(2.05), local.bytes()), (None, 0));
     }

@@ -2,7 +2,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use voxtile_local::{LocalReader, LocalView};
 
-/// The local map as it is published, and whether anybody wants it: it is made for those who listen alone.
+/// Local map for the publishers, and whether it has subscribers. Without subscribers it is not computed.
 #[derive(Debug, Default)]
 pub struct LocalShare {
     is_wanted: AtomicBool,
@@ -10,8 +10,8 @@ pub struct LocalShare {
 }
 
 impl LocalShare {
-    /// Says whether somebody listens.
-    pub fn want(&self, is_wanted: bool) {
+    /// Sets whether the local map has subscribers.
+    pub fn set_wanted(&self, is_wanted: bool) {
         self.is_wanted.store(is_wanted, Ordering::Relaxed);
     }
 
@@ -19,12 +19,11 @@ impl LocalShare {
         self.is_wanted.load(Ordering::Relaxed)
     }
 
-    /// From now on there is this map, or none.
     pub fn set(&self, reader: Option<LocalReader>) {
         *self.reader.lock().unwrap_or_else(PoisonError::into_inner) = reader;
     }
 
-    /// The map after its last scan, if there is one.
+    /// Returns the local map after its last scan, if it exists.
     pub fn view(&self) -> Option<Arc<LocalView>> {
         self.reader.lock().unwrap_or_else(PoisonError::into_inner).as_ref().map(LocalReader::view)
     }

@@ -1,12 +1,12 @@
-//! The node `voxtile_ros2`: clouds and transforms from ROS 2, over DDS or Zenoh, into a map of voxtile. No ROS
+//! ROS 2 node `voxtile_ros2`: maps point clouds and transforms from DDS or Zenoh into a voxtile map. It needs no ROS
 //! installation.
 //!
 //! ```text
-//! Transport -> CloudQueue, TransformBuffer           node: a thread a topic
+//! Transport -> CloudQueue, TransformBuffer           node: one thread per topic
 //! CloudQueue -> cloud with its pose -> Mapper        mapping: one thread
-//! Transport -> corrected path -> Mapping -> Remapping   beside it: one thread, for as long as it takes
+//! Transport -> corrected path -> Mapping -> Remapping   one thread per path, concurrent with mapping
 //! LiveMap -> messages -> Transport                   publishers: one thread
-//! Transport -> orders -> Mapping, questions -> LiveMap services: a thread a service
+//! Transport -> orders -> Mapping, queries -> LiveMap  services: one thread per service
 //! ```
 
 mod args;
@@ -46,10 +46,10 @@ use std::process::ExitCode;
 use std::sync::Arc;
 
 fn main() -> ExitCode {
-    // So that --memory holds: DDS and the mapper have many threads.
+    // Use one malloc arena, so that --memory holds: DDS and the mapper run many threads.
     voxtile::begin_with_one_heap();
-    // To ros2-client a topic that nobody has subscribed to yet is an error, whenever one looks. To a writer of rustdds
-    // it is one when a reader asks again for a message that a newer one has replaced; some readers ask a hundred times.
+    // ros2-client logs an error when it counts the subscribers of a topic without any. The rustdds writer logs an error
+    // when a reader requests a message that a newer one has replaced; some readers repeat the request 100 times.
     let filter = "info,rustdds=error,rustdds::rtps::writer=off,ros2_client=off";
     env_logger::Builder::from_env(env_logger::Env::default().default_filter_or(filter)).init();
     let arguments: Vec<_> = std::env::args_os().collect();
@@ -66,7 +66,7 @@ fn main() -> ExitCode {
 fn run(args: &Args) -> anyhow::Result<()> {
     let stop = stop_signals::catch()?;
     let inbox = Arc::new(Inbox::new(args));
-    // A map that cannot be opened is told before anybody sees a node.
+    // Open the map before the node appears on the network, so that a failure is reported first.
     let (orders, placed_orders) = services::orders();
     let mapping = Mapping::open(args, inbox.clone(), placed_orders)?;
     let node = node::start(args, &inbox, mapping.live(), &orders)?;

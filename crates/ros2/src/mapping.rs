@@ -23,7 +23,7 @@ use voxtile_formats::RigidPose;
 use voxtile_formats::ros::Wire;
 use voxtile_formats::ros::messages::{PointCloud2, StampedPose};
 
-/// The thread that maps: clouds from the inbox into the map, flushed by a timer.
+/// Mapping thread: maps clouds from the inbox and flushes at an interval.
 pub struct Mapping {
     inbox: Arc<Inbox>,
     mapper: OutOfCoreTileMapper,
@@ -31,61 +31,61 @@ pub struct Mapping {
     local: LocalMapping,
     latencies: Latencies,
     orders: Receiver<PlacedOrder>,
-    /// Orders to save, with the scan that has to be durable.
+    /// Save requests, each with the scan that must become durable.
     saves: Vec<(u64, PlacedOrder)>,
-    /// A corrected path, with the last scan before it came, which has to be durable before it is followed.
+    /// Corrected path, with the last scan before its arrival. That scan must be durable before remapping begins.
     path: Option<(u64, Vec<StampedPose>)>,
     remapping: Option<Remapping>,
-    /// Bytes of a remapping.
     remapping_bytes: usize,
     folder: PathBuf,
-    /// What moves scans no farther, in metres, is no correction.
+    /// Paths that move scans by at most this many metres are ignored.
     path_tolerance_m: f64,
     flush_every: Duration,
     flushed_at: Instant,
-    /// Whether one was begun whose end is not known yet.
+    /// Whether a flush was begun whose result is not known yet.
     is_flush_begun: bool,
     has_flush_failed: bool,
-    /// When a refused cloud was last warned of.
+    /// Time of the last warning about a refused cloud.
     warned_at: Option<Instant>,
-    told_at: Instant,
-    looked_at: Instant,
-    /// When the map on disk was last seen to be up to date or to have become newer, and its last scan then.
+    logged_at: Instant,
+    sampled_at: Instant,
+    /// Time when the map on disk was last complete or last advanced, and its last scan then.
     durable: (Instant, u64),
 }
 
-/// How long it waits for a cloud before it looks at its timers.
+/// Longest wait for a cloud before the timers are checked.
 const WAIT: Duration = Duration::from_millis(50);
-const TELL_EVERY: Duration = Duration::from_secs(10);
-const LOOK_EVERY: Duration = Duration::from_secs(1);
-/// Beyond the last voxel that has an index.
+const LOG_EVERY: Duration = Duration::from_secs(10);
+const SAMPLE_EVERY: Duration = Duration::from_secs(1);
+/// Box that contains all voxel indices.
 const EVERYWHERE: Aabb = Aabb { min: [-1e12; 3], max: [1e12; 3] };
 
 impl Mapping {
-    /// Opens the map, or makes it.
+    /// Opens the map, or creates it.
     ///
     /// # Errors
     ///
-    /// A wrong configuration, a map that cannot be opened.
+    /// An invalid configuration, or a map that cannot be opened.
     pub fn open(args: &Args, inbox: Arc<Inbox>, orders: Receiver<PlacedOrder>) -> anyhow::Result<Self> {
-        let flush_every = Duration::try_from_secs_f64(args.flush_every)
-            .map_err(|_| anyhow::anyhow!("--flush-every: {} is no time; give seconds", args.flush_every))?;
+        let flush_every = Duration::try_from_secs_f64(args.flush_every).map_err(|_| {
+            anyhow::anyhow!("--flush-every: {} is not a valid duration; give seconds", args.flush_every)
+        })?;
         let own = |config: MapConfig| {
             config.with_memory_bytes(args.map_bytes()).with_range(args.min_range, args.max_range)
         };
         let is_followed = args.path.is_some();
         ensure!(
             !is_followed || args.cloud.len() == 1,
-            "--path: its poses are of one sensor, and there are {} topics of clouds; name one with --cloud",
+            "--path: the path has poses of one sensor, but there are {} cloud topics; give one with --cloud",
             args.cloud.len()
         );
         let mapper = match MapReader::config_of(&args.output) {
             Ok(config) => {
-                // Resolution and tiles are the map's own.
-                log::info!("going on with the map {}", args.output.display());
+                // Keep the resolution and tile size of the existing map.
+                log::info!("continuing the map {}", args.output.display());
                 ensure!(
                     config.keeps_scans || !is_followed,
-                    "--path: the map {} keeps no scans, so that it cannot follow; begin another one",
+                    "--path: the map {} has no kept scans and cannot follow a path; create a new map",
                     args.output.display()
                 );
                 OutOfCoreTileMapper::open(&args.output, own(config))?
@@ -101,14 +101,14 @@ impl Mapping {
         let least_bytes = MemoryLimit::min_bytes(&mapper.config().grid);
         ensure!(
             !is_followed || args.remapping_bytes() >= least_bytes,
-            "--memory: --path needs {} for maps with such tiles, to have a quarter of it for remapping",
+            "--memory: --path needs at least {} for this tile size, because remapping gets a quarter",
             ByteSize::b(4 * least_bytes as u64)
         );
-        // What a remapping has left that was killed.
+        // Remove files of an interrupted remapping.
         if let Err(error) = OnlineRemap::remove_leftovers(&*args.output) {
             log::warn!("{error}");
         }
-        let (sensor_m, stamp_ns) = last_place(&args.output);
+        let (sensor_m, stamp_ns) = last_sensor(&args.output);
         let frame = args.frame_id.trim_start_matches('/').to_owned();
         let live = Arc::new(LiveMap::new(frame, mapper.reader()?, sensor_m, stamp_ns));
         let parameters = args.local_parameters(mapper.config())?;
@@ -133,23 +133,23 @@ impl Mapping {
             is_flush_begun: false,
             has_flush_failed: false,
             warned_at: None,
-            told_at: now,
-            looked_at: now,
+            logged_at: now,
+            sampled_at: now,
             durable,
         })
     }
 
-    /// The map for those who look at it meanwhile.
+    /// Returns the shared read access to the map.
     pub fn live(&self) -> Arc<LiveMap> {
         self.live.clone()
     }
 
-    /// Maps until it is told to stop; what was mapped is flushed then. What the map refuses is counted, and mapping
-    /// goes on; so it does after a flush that has failed.
+    /// Maps until stopped, then flushes. Counts clouds that the map refuses, and continues after them and after failed
+    /// flushes.
     ///
     /// # Errors
     ///
-    /// The map is none to go on with, or cannot be written at the end.
+    /// The map can no longer be used, or cannot be written at the end.
     pub fn run(mut self, stop: &Stop) -> anyhow::Result<()> {
         while !stop.is_set() {
             if let Some((cloud, pose)) = self.inbox.take(WAIT)
@@ -158,47 +158,47 @@ impl Mapping {
                 return self.give_up(error);
             }
             if let Ok(order) = self.orders.try_recv() {
-                self = self.obey(order)?;
+                self = self.execute(order)?;
             }
             self = self.follow()?;
             self.local.refresh(&self.mapper);
-            if let Err(error) = self.flush_in_time() {
+            if let Err(error) = self.flush_if_due() {
                 return self.give_up(error);
             }
             self.answer_saves();
-            if self.looked_at.elapsed() >= LOOK_EVERY {
-                self.look();
-                self.looked_at = Instant::now();
+            if self.sampled_at.elapsed() >= SAMPLE_EVERY {
+                self.sample_health();
+                self.sampled_at = Instant::now();
             }
-            if self.told_at.elapsed() >= TELL_EVERY {
-                self.tell();
-                self.told_at = Instant::now();
+            if self.logged_at.elapsed() >= LOG_EVERY {
+                self.log_counters();
+                self.logged_at = Instant::now();
             }
         }
         self.remapping = None;
         self.mapper.flush()?;
         self.answer_saves();
-        self.tell();
+        self.log_counters();
         Ok(())
     }
 
-    /// Flushes beside the mapping when it is time, or somebody waits for it.
+    /// Starts a background flush at the interval or when a request waits for it.
     ///
     /// # Errors
     ///
-    /// One after which the map is none to go on with; others are told, and the next flush makes up for them.
-    fn flush_in_time(&mut self) -> voxtile::Result<()> {
+    /// An error after which the map can no longer be used. Other errors are reported, and the next flush retries.
+    fn flush_if_due(&mut self) -> voxtile::Result<()> {
         let is_awaited = self.awaits_flush();
-        // One that takes longer than the timer is waited for by the next, not by clouds.
+        // If a flush takes longer than the interval, delay the next flush, not clouds.
         if self.mapper.is_flushing() {
             return Ok(());
         }
         if std::mem::take(&mut self.is_flush_begun) {
             let flushed = self.mapper.end_flush();
             self.note_flush(&flushed);
-            flushed.or_else(if_none_to_go_on_with)?;
+            flushed.or_else(if_fatal)?;
         }
-        // A disk that refuses is not asked after every scan.
+        // After a failure, only the interval and save requests trigger a flush, not every scan.
         let is_wanted = !self.saves.is_empty() || (is_awaited && !self.has_flush_failed);
         if self.flushed_at.elapsed() >= self.flush_every || is_wanted {
             self.begin_flush()?;
@@ -217,40 +217,37 @@ impl Mapping {
             Ok(()) => self.is_flush_begun = true,
             Err(_) => self.note_flush(&begun),
         }
-        begun.or_else(if_none_to_go_on_with)
+        begun.or_else(if_fatal)
     }
 
-    /// Notes how a flush has ended. Who waits for one that has failed is told so, and the next one makes up for it.
+    /// Records the result of a flush. On failure, pending save requests get the error, and the next flush retries.
     fn note_flush(&mut self, flushed: &voxtile::Result<()>) {
         self.answer_saves();
         self.has_flush_failed = flushed.is_err();
         let Err(error) = flushed else { return };
         self.inbox.count(|counters| counters.failed_flushes += 1);
         for (_, placed) in std::mem::take(&mut self.saves) {
-            placed.answer(Err(format!("the flush has failed: {error:#}")));
+            placed.answer(Err(format!("the flush failed: {error:#}")));
         }
         let durable = self.mapper.flushed_scan_number();
-        log::warn!("a flush has failed, and is tried again; durable up to scan {durable}: {error:#}");
+        log::warn!("a flush failed and will be retried; durable up to scan {durable}: {error:#}");
     }
 
-    /// Ends by an error, with all that was mapped made durable if the disk lets it.
+    /// Flushes the mapped scans, if the disk permits, and returns `error`.
     fn give_up(mut self, error: Error) -> anyhow::Result<()> {
         match self.mapper.flush() {
-            Ok(()) => log::info!("what was mapped is flushed, up to scan {}", self.mapper.scan_number()),
+            Ok(()) => log::info!("flushed the map up to scan {}", self.mapper.scan_number()),
             Err(of_flush) => {
                 let durable = self.mapper.flushed_scan_number();
-                log::error!(
-                    "what was mapped after scan {durable} is lost, it cannot be flushed: {of_flush:#}"
-                );
+                log::error!("cannot flush: scans after {durable} are lost: {of_flush:#}");
             }
         }
         self.answer_saves();
-        self.tell();
+        self.log_counters();
         Err(error.into())
     }
 
-    /// Does what a service asks for, or begins it.
-    fn obey(mut self, placed: PlacedOrder) -> anyhow::Result<Self> {
+    fn execute(mut self, placed: PlacedOrder) -> anyhow::Result<Self> {
         let order = placed.order.clone();
         match order {
             Order::Save => self.saves.push((self.mapper.scan_number(), placed)),
@@ -264,17 +261,17 @@ impl Mapping {
             Order::Revert(name) => {
                 return self.edit(placed, |folder| {
                     let done = operations::revert(folder, &name, None, |_, _| ())?;
-                    Ok(format!("the map is as of scan {} again", done.scan_number))
+                    Ok(format!("reverted to scan {}", done.scan_number))
                 });
             }
         }
         Ok(self)
     }
 
-    /// Follows corrected paths, one after the other: beside the mapper, until what is left is short.
+    /// Follows corrected paths one after the other, concurrently with mapping until few scans remain.
     fn follow(mut self) -> anyhow::Result<Self> {
         if let Some(path) = self.inbox.take_path() {
-            // A later one takes its place, and does not wait longer for that.
+            // A newer path replaces a waiting one without extending the wait.
             let scan = self.path.take().map_or(self.mapper.scan_number(), |(scan, _)| scan);
             self.path = Some((scan, path));
         }
@@ -285,7 +282,7 @@ impl Mapping {
                 Ok(Some(remapped)) => self.change_over(remapped),
                 Ok(None) => Ok(self),
                 Err(error) => {
-                    log::warn!("a path is left out: {error}");
+                    log::warn!("path ignored: {error}");
                     Ok(self)
                 }
             };
@@ -298,13 +295,12 @@ impl Mapping {
             let order = remapping::Order { last_scan, tolerance_m, memory_bytes };
             match Remapping::begin(self.folder.clone(), path, order) {
                 Ok(remapping) => self.remapping = Some(remapping),
-                Err(error) => log::warn!("a path is left out, a thread cannot be started: {error}"),
+                Err(error) => log::warn!("path ignored: cannot start a thread: {error}"),
             }
         }
         Ok(self)
     }
 
-    /// Whether a path goes on with the next flush.
     fn awaits_flush(&mut self) -> bool {
         let (scan, durable) = (self.mapper.scan_number(), self.mapper.flushed_scan_number());
         match &mut self.remapping {
@@ -313,11 +309,11 @@ impl Mapping {
         }
     }
 
-    /// Makes the map what was mapped beside it.
+    /// Swaps in the remapped map.
     fn change_over(self, remapped: remapping::Remapped) -> anyhow::Result<Self> {
         let begun = Instant::now();
         let (last_scan, sensor_m) = remapped.last;
-        let (mut moved, outcome) = self.change(|_| remapped.beside.finish())?;
+        let (mut moved, outcome) = self.change(|_| remapped.online.finish())?;
         match outcome {
             Ok(done) => {
                 let sensor_m = sensor_m.filter(|_| moved.mapper.scan_number() == last_scan);
@@ -333,7 +329,7 @@ impl Mapping {
                     begun.elapsed()
                 );
             }
-            Err(error) => log::warn!("a path is left out: {error}"),
+            Err(error) => log::warn!("path ignored: {error}"),
         }
         moved.flushed_at = Instant::now();
         Ok(moved)
@@ -344,39 +340,39 @@ impl Mapping {
         placed: PlacedOrder,
         change: impl FnOnce(&Path) -> voxtile::Result<String>,
     ) -> anyhow::Result<Self> {
-        // A path that waits is about the scans before, as the one that is followed; perhaps they are no more.
+        // Pending and active paths refer to scans before the change, which may no longer exist.
         let paths =
             [self.remapping.take().is_some(), self.path.take().is_some(), self.inbox.take_path().is_some()];
         if paths.contains(&true) {
-            log::warn!("a path is left out: the map is changed meanwhile");
+            log::warn!("path ignored: the map was changed by a service");
         }
         let (changed, outcome) = self.change(change)?;
         placed.answer(outcome.map_err(|error| error.to_string()));
         Ok(changed)
     }
 
-    /// Changes the map as a whole: it is flushed and closed for that, and clouds wait.
+    /// Flushes and closes the map, changes it as a whole and reopens it. Clouds wait meanwhile.
     fn change<T>(
         mut self,
         change: impl FnOnce(&Path) -> voxtile::Result<T>,
     ) -> anyhow::Result<(Self, voxtile::Result<T>)> {
-        // What is not flushed would be lost, so the map stays as it is.
+        // Without a flush the change would lose scans, so do not change the map.
         let flushed = self.mapper.flush();
         self.note_flush(&flushed);
         if let Err(error) = flushed {
             return Ok((self, Err(error)));
         }
-        self.local.forget();
+        self.local.reset();
         let config = self.mapper.config().clone();
         drop(self.mapper);
         let outcome = change(&self.folder);
-        // A map that is not as it was is none to go on with.
+        // If the changed map cannot be opened, the node ends.
         let mapper = OutOfCoreTileMapper::open(&self.folder, config)?;
         self.live.note_opening(mapper.reader()?, None);
         let durable = (Instant::now(), mapper.flushed_scan_number());
         let mut changed = Self { mapper, durable, ..self };
-        // Who asked for the change looks at the diagnostics next.
-        changed.look();
+        // The caller may read the diagnostics next.
+        changed.sample_health();
         Ok((changed, outcome))
     }
 
@@ -392,8 +388,8 @@ impl Mapping {
         done.into_iter().for_each(|(_, placed)| placed.answer(Ok(format!("durable up to scan {durable}"))));
     }
 
-    /// Writes down for others how the map is.
-    fn look(&mut self) {
+    /// Stores the health of the map for the diagnostics.
+    fn sample_health(&mut self) {
         let (scan_number, flushed) = (self.mapper.scan_number(), self.mapper.flushed_scan_number());
         if !self.mapper.is_dirty() || flushed != self.durable.1 {
             self.durable = (Instant::now(), flushed);
@@ -413,16 +409,16 @@ impl Mapping {
     ///
     /// # Errors
     ///
-    /// The map is none to go on with.
+    /// The map can no longer be used.
     fn insert(&mut self, cloud: &Cloud, world_from_sensor: &RigidPose) -> voxtile::Result<()> {
-        // The inbox has decoded it once: it is whole, and there is room for its points.
+        // The inbox decoded it before: it is complete, and memory for its points is reserved.
         let Ok(message) = PointCloud2::decode(Wire::Cdr, &cloud.cdr) else { return Ok(()) };
         let points = CloudPoints::of(&message);
         let scan = points.scan(world_from_sensor, cloud.stamp_ns);
         match scan.and_then(|scan| self.mapper.insert_points(&scan).map(|_| scan)) {
             Ok(scan) => {
-                // Before others hear of the scan: they publish once what they see then.
-                self.local.follow(&scan);
+                // Update the local map before `note_scan`: publishers send each version once.
+                self.local.insert(&scan);
                 let (scan_number, sensor_m) = (self.mapper.scan_number(), world_from_sensor.position_m);
                 self.live.note_scan(scan_number, sensor_m, cloud.stamp_ns);
                 self.latencies.note(cloud.arrived.elapsed());
@@ -433,43 +429,43 @@ impl Mapping {
         }
     }
 
-    /// Counts a cloud that the map has refused. The map is as before, and the next cloud may do.
+    /// Counts a cloud that the map refused. The map is unchanged, and the next cloud may succeed.
     fn refuse(&mut self, error: Error) -> voxtile::Result<()> {
         let Some(refusal) = Refusal::of(&error) else { return Err(error) };
         self.inbox.count(|counters| refusal.count(counters));
-        // It may be the same with every cloud that comes.
-        if self.warned_at.is_none_or(|at| at.elapsed() >= LOOK_EVERY) {
-            log::warn!("a cloud is left out: {error:#}");
+        // Limit the rate of warnings: each cloud may fail for the same reason.
+        if self.warned_at.is_none_or(|at| at.elapsed() >= SAMPLE_EVERY) {
+            log::warn!("cloud refused: {error:#}");
             self.warned_at = Some(Instant::now());
         } else {
-            log::debug!("a cloud is left out: {error:#}");
+            log::debug!("cloud refused: {error:#}");
         }
         Ok(())
     }
 
-    fn tell(&self) {
+    fn log_counters(&self) {
         let (counters, waiting) = self.inbox.counters();
         let [p50, p99] = [50, 99].map(|percent| self.latencies.percentile(percent).unwrap_or_default());
         log::info!(
-            "{counters}; {waiting} wait; the map is at scan {}; {p50:.1?} from cloud to map, p99 {p99:.1?}",
+            "{counters}; {waiting} waiting; map at scan {}; latency p50 {p50:.1?}, p99 {p99:.1?}",
             self.mapper.scan_number()
         );
     }
 }
 
-/// The error of a flush after which the map is none to go on with.
-fn if_none_to_go_on_with(error: Error) -> voxtile::Result<()> {
+/// Returns the error of a flush if the map can no longer be used after it.
+fn if_fatal(error: Error) -> voxtile::Result<()> {
     if Refusal::of(&error).is_some() { Ok(()) } else { Err(error) }
 }
 
-/// Makes the voxels of a box unknown.
+/// Sets the voxels of a box to unknown.
 fn cleared(folder: &Path, region: Aabb) -> voxtile::Result<String> {
     let cleared = operations::clear(folder, &Part::Inside(region), |_, _| ())?;
-    Ok(format!("{} voxels are unknown now", cleared.voxels_cleared))
+    Ok(format!("{} voxels set to unknown", cleared.voxels_cleared))
 }
 
-/// Where the sensor of a map was last, and when; the origin where the map does not tell.
-fn last_place(folder: &Path) -> (Point, i64) {
+/// Returns the position and stamp of the last scan, or the origin if unknown.
+fn last_sensor(folder: &Path) -> (Point, i64) {
     let scans = MapReader::open(folder, 0).and_then(|reader| reader.scans());
     let last = scans.ok().and_then(|scans| scans.last().copied());
     last.map_or(([0.0; 3], 0), |scan| (scan.origin_m, scan.stamp_ns.unwrap_or(0)))

@@ -1,59 +1,59 @@
 use anyhow::{Context as _, anyhow, ensure};
 use ros2_client::{Name, NodeName};
 
-/// Names of the node, its topics and its services as others see them: in its namespace, and as a launch file maps them.
+/// Resolves names of topics and services: in the node's namespace, after the remapping rules of launch files.
 #[derive(Clone, Debug)]
 pub struct Names {
-    /// `/`, or without a slash at its end.
+    /// `/`, or an absolute name without a trailing slash.
     namespace: String,
     node_name: String,
-    /// Absolute names: what one is called, and what it is to be called.
-    mapped: Vec<[String; 2]>,
+    /// Pairs of absolute names: from, to.
+    remapped: Vec<[String; 2]>,
 }
 
-/// Between the two names of a rule.
-pub const BECOMES: &str = ":=";
+/// Separator of the two names in a remapping rule.
+pub const RULE_SEPARATOR: &str = ":=";
 
 impl Names {
     /// # Errors
     ///
-    /// Rules that are none.
+    /// Invalid remapping rules.
     pub fn new(namespace: &str, node_name: &str, rules: &[String]) -> anyhow::Result<Self> {
         let namespace = format!("/{}", namespace.trim_matches('/'));
-        let mut names = Self { namespace, node_name: node_name.to_owned(), mapped: Vec::new() };
+        let mut names = Self { namespace, node_name: node_name.to_owned(), remapped: Vec::new() };
         for rule in rules {
             let [from, to] = names.of_rule(rule).with_context(|| format!("--remap {rule}"))?;
-            names.mapped.push([from, to]);
+            names.remapped.push([from, to]);
         }
         Ok(names)
     }
 
     fn of_rule(&self, rule: &str) -> anyhow::Result<[String; 2]> {
-        let both = rule.split_once(BECOMES);
-        let (from, to) = both.ok_or_else(|| anyhow!("no rule; one looks like cloud_in:=/lidar/points"))?;
-        ensure!(!from.contains("://"), "rules for topics or services alone are not known");
+        let both = rule.split_once(RULE_SEPARATOR);
+        let (from, to) = both.ok_or_else(|| anyhow!("expected FROM:=TO, such as cloud_in:=/lidar/points"))?;
+        ensure!(!from.contains("://"), "rules for only topics or only services are not supported");
         let names = [self.absolute(from), self.absolute(to)];
         names.iter().try_for_each(|name| self::split(name).map(drop))?;
         Ok(names)
     }
 
-    /// The name that others use, from the root on.
+    /// Returns the absolute name after remapping.
     pub fn full(&self, name: &str) -> String {
         let name = self.absolute(name);
-        self.mapped.iter().find(|[from, _]| *from == name).map_or(name, |[_, to]| to.clone())
+        self.remapped.iter().find(|[from, _]| *from == name).map_or(name, |[_, to]| to.clone())
     }
 
-    /// The namespace of the node; `/` for none.
+    /// Returns the namespace of the node; `/` for none.
     #[cfg(feature = "zenoh")]
     pub fn namespace(&self) -> &str {
         &self.namespace
     }
 
-    /// The same as `ros2-client` takes it.
+    /// Returns the absolute name after remapping as a name of `ros2-client`.
     ///
     /// # Errors
     ///
-    /// A name that is none in ROS 2.
+    /// A name that is invalid in ROS 2.
     pub fn of(&self, name: &str) -> anyhow::Result<Name> {
         let full = self.full(name);
         let (namespace, own) = split(&full)?;
@@ -62,14 +62,14 @@ impl Names {
 
     /// # Errors
     ///
-    /// A name that is none in ROS 2.
+    /// A name that is invalid in ROS 2.
     pub fn of_node(&self) -> anyhow::Result<NodeName> {
         NodeName::new(&self.namespace, &self.node_name).map_err(|error| {
             anyhow!("--namespace {}, --node-name {}: {error:?}", self.namespace, self.node_name)
         })
     }
 
-    /// `/a` as it is, `a` in the namespace of the node, `~/a` under its name.
+    /// Makes a name absolute: `/a` is unchanged, `a` is in the namespace of the node, `~/a` is below its name.
     fn absolute(&self, name: &str) -> String {
         let base = self.namespace.trim_end_matches('/');
         match name.strip_prefix("~/") {
@@ -80,14 +80,17 @@ impl Names {
     }
 }
 
-/// Namespace and last part of an absolute name.
+/// Splits an absolute name into namespace and last part.
 fn split(full: &str) -> anyhow::Result<(&str, &str)> {
     let is_name = |part: &str| {
         part.starts_with(|c: char| c.is_ascii_alphabetic() || c == '_')
             && part.chars().all(|c| c.is_ascii_alphanumeric() || c == '_')
     };
     let is_right = full.strip_prefix('/').is_some_and(|bare| bare.split('/').all(is_name));
-    ensure!(is_right, "{full:?} is no name of a topic or a service; one looks like /lidar/points");
+    ensure!(
+        is_right,
+        "{full:?} is not a valid name of a topic or service; expected a name such as /lidar/points"
+    );
     let (namespace, own) = full.rsplit_once('/').unwrap_or_default();
     Ok((if namespace.is_empty() { "/" } else { namespace }, own))
 }
@@ -114,7 +117,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_name_is_refused() {
+    fn invalid_names_are_refused() {
         for rule in ["cloud_in", "a:=", ":=b", "a b:=c", "rostopic://a:=b", "a:=b//c"] {
             assert!(Names::new("/", "n", &[rule.to_owned()]).is_err(), "{rule}");
         }

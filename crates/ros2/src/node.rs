@@ -10,7 +10,6 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
 use voxtile_formats::ros::messages::MessageKind;
 
-/// What keeps the node in the graph.
 pub struct RunningNode {
     publishing: JoinHandle<()>,
     stop: Arc<AtomicBool>,
@@ -18,21 +17,21 @@ pub struct RunningNode {
 }
 
 impl RunningNode {
-    /// Leaves the graph.
+    /// Stops publishing and leaves the graph.
     pub fn end(self) {
         self.stop.store(true, Ordering::Relaxed);
         if self.publishing.join().is_err() {
-            log::error!("the thread that publishes has died");
+            log::error!("the publisher thread panicked");
         }
         self.transport.leave();
     }
 }
 
-/// Joins the others and reads each topic in a thread of its own.
+/// Joins the ROS graph and reads each topic in a thread of its own.
 ///
 /// # Errors
 ///
-/// No sockets; names of topics that ROS 2 does not know.
+/// No sockets, or invalid topic names.
 pub fn start(
     args: &Args,
     inbox: &Arc<Inbox>,
@@ -71,12 +70,13 @@ pub fn start(
     }
     let names = args.names()?;
     let clouds: Vec<String> = args.cloud.iter().map(|topic| names.full(topic)).collect();
-    log::info!("listening to {} in domain {}", clouds.join(", "), args.domain_id);
+    log::info!("subscribed to {} in domain {}", clouds.join(", "), args.domain_id);
     services::start(args, &mut transport, &map, orders)?;
     let mut publishing = Publishing::new(args, &mut transport, inbox.clone(), map)?;
     let stop = Arc::new(AtomicBool::new(false));
-    let its_stop = stop.clone();
+    let thread_stop = stop.clone();
     let thread = std::thread::Builder::new().name("publisher".to_owned());
-    let publishing = thread.spawn(move || publishing.run(&its_stop)).context("a thread cannot be started")?;
+    let publishing =
+        thread.spawn(move || publishing.run(&thread_stop)).context("cannot start the publisher thread")?;
     Ok(RunningNode { publishing, stop, transport })
 }

@@ -2,20 +2,20 @@ use crate::transport::Gid;
 use std::collections::{HashMap, HashSet};
 use voxtile_formats::ros::{SecondParent, Transforms};
 
-/// Warns of frames that get a second parent, or a parent that makes a loop: once for each pair of frames.
+/// Warns of frames that get a second parent or a parent that closes a loop, once for each pair of frames.
 #[derive(Debug, Default)]
 pub struct ParentWarnings {
     warned: HashSet<[String; 2]>,
-    /// Who said first where a frame is.
+    /// First publisher of the transform of each frame.
     publishers: HashMap<String, Gid>,
 }
 
-/// Bounds of what a flood of frames makes the log, and the memory.
+/// Bounds on the log and the memory under a flood of frames.
 const MAX_WARNINGS: usize = 100;
 const MAX_PUBLISHERS: usize = 2000;
 
 impl ParentWarnings {
-    /// Looks at a parent that a frame did not have before, and warns if there is something wrong with it.
+    /// Checks a parent that a frame did not have before, and warns of a second parent or a loop.
     pub fn check(&mut self, transforms: &Transforms, [parent, child]: [&str; 2], publisher: Option<Gid>) {
         if self.warned.len() < MAX_WARNINGS
             && !self.warned.contains(&[parent, child].map(str::to_owned))
@@ -24,7 +24,7 @@ impl ParentWarnings {
             log::warn!("{}", self.text(&second, publisher));
             self.warned.insert([parent, child].map(str::to_owned));
             if self.warned.len() == MAX_WARNINGS {
-                log::warn!("{MAX_WARNINGS} pairs of frames are wrong by now; no more are reported");
+                log::warn!("{MAX_WARNINGS} pairs of frames have conflicting parents; no more are reported");
             }
         }
         if let Some(gid) = publisher
@@ -49,7 +49,7 @@ impl ParentWarnings {
         )
     }
 
-    /// Number of pairs of which it warned.
+    /// Returns the number of pairs with a warning.
     #[cfg(test)]
     pub fn len(&self) -> usize {
         self.warned.len()

@@ -1,21 +1,21 @@
 use crate::counters::Counters;
 use voxtile::Error;
 
-/// Why the map has not taken a cloud, or a flush: it is as before then, and the next one may do.
+/// Reason why the map refused a cloud or a flush failed. The map is unchanged, and the next attempt may succeed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Refusal {
-    /// A pose that is none, or beyond all tiles.
+    /// An invalid pose, or one beyond all tiles.
     Malformed,
-    /// The map has outgrown its memory.
+    /// The map exceeds its memory limit.
     Memory,
-    /// A tile that belongs to it is damaged on disk.
+    /// A tile is damaged on disk.
     Damaged,
-    /// The disk has no room, or something else against it.
+    /// A disk error, such as a full disk.
     Disk,
 }
 
 impl Refusal {
-    /// `None` for an error after which the map is none to go on with.
+    /// Returns `None` for an error after which the map can no longer be used.
     pub fn of(error: &Error) -> Option<Self> {
         Some(match error {
             Error::InvalidArgument { argument, .. } if argument == "memory" => Self::Memory,
@@ -26,7 +26,6 @@ impl Refusal {
         })
     }
 
-    /// Counts a cloud that was refused.
     pub fn count(self, counters: &mut Counters) {
         let count = match self {
             Self::Malformed => &mut counters.malformed,

@@ -1,45 +1,44 @@
 use std::collections::HashMap;
 use std::time::{Duration, Instant};
 
-/// Tells stamps that cannot be from a clock that has jumped: a robot's whose time was set, a simulation's that began
-/// anew. Each child frame is judged by itself: one with a wrong clock costs the others nothing.
+/// Distinguishes invalid stamps from a jump of the clock, for example when a robot's time is set or a simulation
+/// restarts. Each child frame is judged separately, so a wrong clock of one frame does not affect others.
 #[derive(Debug, Default)]
 pub struct StampCheck {
-    /// Of all frames.
+    /// Newest accepted stamp of all frames.
     newest_ns: Option<i64>,
     children: HashMap<String, Child>,
 }
 
-/// What is known of a child frame.
 #[derive(Clone, Copy, Debug, Default)]
 struct Child {
     newest_ns: Option<i64>,
     taken: Option<Instant>,
-    /// Since when there is nothing but stamps far in the future, or far older ones.
+    /// Time since when all stamps are far in the future or far older.
     off_since: Option<Instant>,
 }
 
-/// What is to be done with a transform.
+/// Decision about a transform.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum StampVerdict {
     Take,
     Refuse,
-    /// The clock is another one since then: what was known of these frames is of no use. All of them if most have
-    /// jumped.
+    /// The clock has jumped at `since`. Drop earlier transforms of these frames. If most frames have jumped, these are
+    /// all frames.
     Jump {
         children: Vec<String>,
         since: Instant,
     },
 }
 
-/// So far ahead of all others a stamp is none, unless all of its frame are.
+/// A stamp this far ahead of all others is invalid, unless all stamps of its frame are.
 const MAX_AHEAD_NS: i64 = 10_000_000_000;
-/// So far behind the last one of its frame it is none, unless all of its frame are.
+/// A stamp this far behind the newest of its frame is invalid, unless all stamps of its frame are.
 const MAX_BEHIND_NS: i64 = 2_000_000_000;
-/// Bound of what a flood can fill.
+/// Limit on memory under a flood of frames.
 const MAX_CHILDREN: usize = 4000;
-/// For so long all have to be.
-const PROOF: Duration = Duration::from_millis(500);
+/// Time for which all stamps must be off before the clock counts as changed.
+const CONFIRM_AFTER: Duration = Duration::from_millis(500);
 
 impl StampCheck {
     pub fn verdict(&mut self, child: &str, stamp_ns: i64, now: Instant) -> StampVerdict {
@@ -53,38 +52,38 @@ impl StampCheck {
             return StampVerdict::Take;
         }
         let since = known.off_since.unwrap_or(now);
-        if now.saturating_duration_since(since) < PROOF {
+        if now.saturating_duration_since(since) < CONFIRM_AFTER {
             self.note(child, Child { off_since: Some(since), ..known });
             return StampVerdict::Refuse;
         }
-        StampVerdict::Jump { children: self.follow(child, stamp_ns, since, now), since }
+        StampVerdict::Jump { children: self.accept_jump(child, stamp_ns, since, now), since }
     }
 
-    /// The frames whose clocks may have jumped, and since when.
+    /// Returns the frames whose clocks may have jumped, each with the time since when.
     pub fn off(&self) -> impl Iterator<Item = (&str, Instant)> {
         self.children.iter().filter_map(|(child, known)| Some((child.as_str(), known.off_since?)))
     }
 
-    /// Forgets a frame.
     pub fn forget(&mut self, child: &str) {
         self.children.remove(child);
     }
 
-    /// Follows the clock of a child that has been off since then, and returns whose past is of no use.
-    fn follow(&mut self, child: &str, stamp_ns: i64, since: Instant, now: Instant) -> Vec<String> {
+    /// Accepts the new clock of a child that has been off since `since`. Returns the frames whose earlier transforms
+    /// are invalid.
+    fn accept_jump(&mut self, child: &str, stamp_ns: i64, since: Instant, now: Instant) -> Vec<String> {
         let jumped = if self.are_most_off(since) {
-            // Frames that were not heard meanwhile have their stamps of the clock before.
+            // Frames without transforms since then have stamps of the old clock.
             std::mem::take(&mut self.children).into_keys().collect()
         } else {
             vec![child.to_owned()]
         };
         self.note(child, Child { newest_ns: Some(stamp_ns), taken: Some(now), off_since: None });
-        // Who goes back alone leaves the time of the others as it is.
+        // A single frame that jumps back does not change the newest stamp of the others.
         self.newest_ns = self.children.values().filter_map(|known| known.newest_ns).max();
         jumped
     }
 
-    /// Whether more frames are off than have had a stamp taken since then.
+    /// Returns whether more frames are off than have had a stamp accepted after `since`.
     fn are_most_off(&self, since: Instant) -> bool {
         let is_off = |known: &&Child| known.off_since.is_some();
         let is_on_time = |known: &&Child| !is_off(known) && known.taken.is_some_and(|taken| taken >= since);
@@ -107,14 +106,14 @@ mod tests {
 
     const S: i64 = 1_000_000_000;
 
-    /// Verdicts on stamps in seconds that come every 100 ms.
+    /// Returns the verdicts on stamps in seconds that arrive every 100 ms.
     fn verdicts(check: &mut StampCheck, from: Instant, stamps_s: &[i64]) -> Vec<StampVerdict> {
         let at = |k: usize| from + Duration::from_millis(100) * k as u32;
         stamps_s.iter().enumerate().map(|(k, stamp)| check.verdict("base", stamp * S, at(k))).collect()
     }
 
     #[test]
-    fn stamps_far_in_the_future_are_refused_while_others_come() {
+    fn stamps_far_in_the_future_are_refused_among_valid_ones() {
         let (mut check, now) = (StampCheck::default(), Instant::now());
         let stamps = [100, 900, 900, 101, 900, 102, 900, 900, 103, 900, 102, 104];
         let expected = [Take, Refuse, Refuse, Take, Refuse, Take, Refuse, Refuse, Take, Refuse, Take, Take];
@@ -123,7 +122,7 @@ mod tests {
     }
 
     #[test]
-    fn a_clock_that_jumps_is_followed_after_half_a_second() {
+    fn a_jumped_clock_is_accepted_after_half_a_second() {
         for to in [900, 90] {
             let (mut check, now) = (StampCheck::default(), Instant::now());
             let stamps = [100, to, to, to + 1, to + 1, to + 1, to + 1, to + 2];
@@ -134,7 +133,7 @@ mod tests {
     }
 
     #[test]
-    fn frames_that_rest_for_long_are_not_early() {
+    fn a_frame_without_updates_for_long_is_not_early() {
         let (mut check, now) = (StampCheck::default(), Instant::now());
         assert_eq!(check.verdict("odom", 100 * S, now), Take);
         for stamp_s in (100..130).step_by(5) {
@@ -143,7 +142,8 @@ mod tests {
         assert_eq!(check.verdict("odom", 130 * S, now), Take);
     }
 
-    /// How many stamps of a frame are refused while another one has its own clock: both every 10 ms, stamps in seconds.
+    /// Returns the number of refused stamps of a frame while another frame uses its own clock. Both send every 10 ms;
+    /// stamps are in seconds.
     fn refused(other_s: impl Fn(i64) -> i64, good_s: impl Fn(i64) -> i64) -> usize {
         let (mut check, start) = (StampCheck::default(), Instant::now());
         let mut refused = 0;
@@ -161,18 +161,18 @@ mod tests {
     }
 
     #[test]
-    fn a_frame_without_stamps_that_comes_first_costs_the_others_half_a_second() {
+    fn a_first_frame_with_zero_stamps_delays_others_by_half_a_second() {
         assert_eq!(refused(|_| 0, |_| 1_700_000_000), 50);
     }
 
     #[test]
-    fn a_frame_whose_clock_falls_back_costs_the_others_nothing() {
+    fn a_frame_whose_clock_jumps_does_not_affect_others() {
         assert_eq!(refused(|number| if number < 100 { 1000 } else { 5 }, |_| 1000), 0);
         assert_eq!(refused(|number| if number < 100 { 1000 } else { 90_000 }, |_| 1000), 0);
     }
 
     #[test]
-    fn when_most_frames_go_back_all_are_forgotten() {
+    fn a_jump_of_most_frames_resets_all() {
         let (mut check, start) = (StampCheck::default(), Instant::now());
         for child in ["rests", "odom", "base", "arm"] {
             assert_eq!(check.verdict(child, 1000 * S, start), Take);
@@ -188,7 +188,7 @@ mod tests {
                 }
             }
         }
-        // The arm is the one that is early then.
+        // After the reset, the arm's clock is ahead of the others.
         assert_eq!(jumps, ["arm base odom rests", "arm"]);
     }
 }

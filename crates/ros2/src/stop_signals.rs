@@ -4,21 +4,21 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use voxtile::Stop;
 
-/// As shells tell that a signal has ended a process.
+/// Exit code after SIGINT, as shells report it.
 const INTERRUPTED: i32 = 130;
 
-/// SIGINT and SIGTERM ask to stop. A second one of the same kind ends the process at once: `ros2 launch` sends the
-/// other kind by itself when the last flush takes long.
+/// Catches SIGINT and SIGTERM as requests to stop. A second signal of the same kind ends the process at once. `ros2
+/// launch` sends SIGTERM after SIGINT if the last flush takes long, so a different kind must not.
 ///
 /// # Errors
 ///
-/// The system refuses.
+/// The handlers cannot be installed.
 pub fn catch() -> std::io::Result<Stop> {
     let stop = Stop::default();
     for signal in [SIGINT, SIGTERM] {
-        let came = Arc::new(AtomicBool::new(false));
-        flag::register_conditional_shutdown(signal, INTERRUPTED, came.clone())?;
-        flag::register(signal, came)?;
+        let received = Arc::new(AtomicBool::new(false));
+        flag::register_conditional_shutdown(signal, INTERRUPTED, received.clone())?;
+        flag::register(signal, received)?;
         flag::register(signal, stop.flag())?;
     }
     Ok(stop)
@@ -30,10 +30,10 @@ mod tests {
     use signal_hook::low_level::raise;
 
     #[test]
-    fn the_signal_of_a_launch_file_behind_that_of_a_person_ends_no_flush() {
+    fn sigterm_after_sigint_does_not_interrupt_the_flush() {
         let stop = catch().unwrap();
         assert!(!stop.is_set());
-        // Would one end the process, the tests would not go on.
+        // If a signal ended the process, the test would fail.
         for signal in [SIGINT, SIGTERM] {
             raise(signal).unwrap();
             assert!(stop.is_set());

@@ -14,34 +14,34 @@ use voxtile_formats::poses::most_gap_ns;
 use voxtile_formats::ros::messages::StampedPose;
 use voxtile_formats::ros::{BadTransform, Transforms, WhyNot};
 
-/// The last seconds of tf, and how long clouds wait for more of it.
+/// Buffer of recent transforms. Also decides how long clouds wait for their poses.
 #[derive(Debug)]
 pub struct TransformBuffer {
     transforms: Transforms,
     stamps: StampCheck,
     fixed_frame: String,
-    most_wait: Duration,
-    /// Samples since the last time that old ones were forgotten, and those left then.
+    max_wait: Duration,
+    /// Number of samples since the last removal of old ones, and number left after it.
     samples: (usize, usize),
     owners: FrameOwners,
-    /// Frames of clouds so far, each with the stamp of the last cloud that had a pose.
+    /// Frames of clouds, each with the stamp of the last cloud that had a pose.
     sensors: HashMap<String, Option<i64>>,
     parents: ParentWarnings,
     watch: PoseWatch,
     refused_at: Option<Instant>,
 }
 
-/// As long as the buffers of tf2 are.
+/// Length of the buffer, as in tf2.
 const SPAN_NS: i64 = 10_000_000_000;
-/// Old samples are forgotten after so many new ones.
+/// Number of new samples after which old ones are removed.
 const FORGET_EVERY: usize = 1000;
-/// Bounds of what a flood can fill.
+/// Limits on memory under a flood of transforms.
 const MAX_SAMPLES: usize = 200_000;
 const MAX_FRAMES: usize = 2000;
 const MAX_SENSORS: usize = 100;
 const MAX_NAME_BYTES: usize = 256;
-/// How often transforms that are none are reported.
-const REFUSED_AGAIN: Duration = Duration::from_secs(30);
+/// Interval between warnings about invalid transforms.
+const WARN_REFUSED_EVERY: Duration = Duration::from_secs(30);
 
 impl TransformBuffer {
     pub fn new(args: &Args) -> Self {
@@ -52,7 +52,7 @@ impl TransformBuffer {
             transforms,
             stamps: StampCheck::default(),
             fixed_frame: bare(&args.frame_id).to_owned(),
-            most_wait: args.transform_wait,
+            max_wait: args.transform_wait,
             samples: (0, 0),
             owners: FrameOwners::default(),
             sensors: HashMap::new(),
@@ -62,7 +62,7 @@ impl TransformBuffer {
         }
     }
 
-    /// Takes a transform. Clouds that wait get their poses before it replaces what they need.
+    /// Inserts a transform. If old samples must be removed, waiting clouds get their poses first.
     pub fn insert(
         &mut self,
         pose: &StampedPose,
@@ -73,17 +73,18 @@ impl TransformBuffer {
         counters: &mut Counters,
     ) {
         if self.samples.0 >= FORGET_EVERY {
-            self.make_room(queue, counters);
+            self.remove_old(queue, counters);
         }
         let (new, kept) = self.samples;
         let (parent, child) = (&pose.header.frame_id, &pose.child_frame);
         let is_long = parent.len().max(child.len()) > MAX_NAME_BYTES;
         if !is_long && !self.owners.knows(bare(child)) && self.owners.len() >= MAX_FRAMES {
-            self.forget_frames(counters);
+            self.remove_frames(counters);
         }
         let is_new = !self.owners.knows(bare(child));
         let is_full = new + kept >= MAX_SAMPLES || (is_new && self.owners.len() >= MAX_FRAMES);
-        if is_long || is_full || !(is_static || self.is_of_now(child, pose.header.stamp_ns, now, queue)) {
+        if is_long || is_full || !(is_static || self.has_valid_stamp(child, pose.header.stamp_ns, now, queue))
+        {
             counters.transforms_refused += 1;
         } else {
             let stamp_ns = pose.header.stamp_ns;
@@ -102,8 +103,8 @@ impl TransformBuffer {
         self.samples.0 += 1;
     }
 
-    /// Forgets what is old, and of who floods the buffer so much that there is room for others.
-    fn make_room(&mut self, queue: &mut CloudQueue, counters: &mut Counters) {
+    /// Removes old samples, and of the largest frames enough to free memory for others.
+    fn remove_old(&mut self, queue: &mut CloudQueue, counters: &mut Counters) {
         queue.settle(|cloud| self.find(cloud).ok());
         let mut left = self.transforms.forget_older_than(SPAN_NS);
         while left > MAX_SAMPLES - FORGET_EVERY {
@@ -117,13 +118,13 @@ impl TransformBuffer {
         self.samples = (0, left);
     }
 
-    /// Forgets frames of who names most, so that there is room for others: those that lead from a sensor to the map stay.
-    fn forget_frames(&mut self, counters: &mut Counters) {
+    /// Removes frames of the publishers with most frames. Frames that connect a sensor to the map are kept.
+    fn remove_frames(&mut self, counters: &mut Counters) {
         let fixed = self.fixed_frame.as_str();
         let mut needed = HashSet::new();
         for (sensor, stamp_ns) in &self.sensors {
             needed.extend(self.transforms.frames_between(fixed, sensor).unwrap_or_default());
-            // These may be others, and a flood may lead to too many of those.
+            // Also keep the frames of the last pose, because a flood of ancestors can make `frames_between` fail.
             let last = stamp_ns.map(|stamp_ns| self.transforms.links_between(fixed, sensor, stamp_ns));
             needed.extend(last.and_then(Result::ok).into_iter().flatten().flatten());
         }
@@ -134,15 +135,16 @@ impl TransformBuffer {
         }
     }
 
-    /// Whether a stamp is one of the robot's clock. If that of a frame has jumped, what was before it is forgotten.
-    fn is_of_now(&mut self, child: &str, stamp_ns: i64, now: Instant, queue: &mut CloudQueue) -> bool {
+    /// Returns whether a stamp is of the current clock. If the clock of a frame has jumped, removes its earlier
+    /// samples.
+    fn has_valid_stamp(&mut self, child: &str, stamp_ns: i64, now: Instant, queue: &mut CloudQueue) -> bool {
         match self.stamps.verdict(child, stamp_ns, now) {
             StampVerdict::Take => true,
             StampVerdict::Refuse => false,
             StampVerdict::Jump { children, since } => {
                 let (count, of) = (children.len(), if children.len() > 1 { " and others" } else { "" });
                 log::warn!(
-                    "the clock of {child}{of} has jumped: the transforms of {count} frames before are forgotten"
+                    "the clock of {child}{of} has jumped: dropped the earlier transforms of {count} frames"
                 );
                 queue.settle(|cloud| if cloud.arrived < since { self.look_up(cloud).ok() } else { None });
                 for child in children {
@@ -153,7 +155,7 @@ impl TransformBuffer {
         }
     }
 
-    /// Whether a cloud has its pose, may still get it, or never will.
+    /// Returns the pose of a cloud, or whether it may still arrive.
     pub fn verdict(&mut self, cloud: &Cloud, now: Instant) -> Verdict<RigidPose> {
         if !self.sensors.contains_key(bare(&cloud.frame)) && self.sensors.len() < MAX_SENSORS {
             self.sensors.insert(bare(&cloud.frame).to_owned(), None);
@@ -163,7 +165,7 @@ impl TransformBuffer {
                 if let Some(stamp_ns) = self.sensors.get_mut(bare(&cloud.frame)) {
                     *stamp_ns = Some(cloud.stamp_ns);
                 }
-                self.watch.found(cloud.topic);
+                self.watch.note_found(cloud.topic);
                 return Verdict::Ready(pose);
             }
             Err(why) => why,
@@ -172,36 +174,36 @@ impl TransformBuffer {
         let missed = || {
             format!("{} (a cloud of {} in {})", printable(&why), cloud.frame.escape_debug(), self.fixed_frame)
         };
-        if let Some(warning) = self.watch.missed(cloud.topic, now, may_pass, missed) {
+        if let Some(warning) = self.watch.note_missed(cloud.topic, now, may_pass, missed) {
             log::warn!("{warning}{}", remedy(&why));
         }
-        // Transforms may come late and out of order.
-        if may_pass && now.saturating_duration_since(cloud.arrived) < self.most_wait {
-            log::trace!("a cloud of {} waits: {why}", cloud.frame);
+        // Transforms may arrive late and out of order.
+        if may_pass && now.saturating_duration_since(cloud.arrived) < self.max_wait {
+            log::trace!("a cloud of {} is waiting: {why}", cloud.frame);
             return Verdict::Waits;
         }
-        log::debug!("a cloud is dropped, it has no pose in {}: {why}", self.fixed_frame);
-        Verdict::Hopeless
+        log::debug!("cloud dropped without a pose in {}: {why}", self.fixed_frame);
+        Verdict::Expired
     }
 
-    /// Why no cloud gets a pose, if that lasts.
-    pub fn trouble(&self) -> Option<String> {
-        self.watch.trouble()
+    /// Returns the reasons for which clouds get no poses, if they persist.
+    pub fn problem(&self) -> Option<String> {
+        self.watch.problem()
     }
 
     fn warn_of_refused(&mut self, why: &BadTransform, publisher: Option<Gid>, now: Instant) {
-        if self.refused_at.is_some_and(|at| now.saturating_duration_since(at) < REFUSED_AGAIN) {
+        if self.refused_at.is_some_and(|at| now.saturating_duration_since(at) < WARN_REFUSED_EVERY) {
             return;
         }
         self.refused_at = Some(now);
         let publisher = publisher.map(|gid| format!(" (publisher {gid})")).unwrap_or_default();
-        log::warn!("a transform is refused{publisher}: {}", printable(why));
+        log::warn!("transform refused{publisher}: {}", printable(why));
     }
 
-    /// The pose of a cloud, if its clock is known now.
+    /// Returns the pose of a cloud, unless the clock of one of its frames may have jumped.
     fn find(&self, cloud: &Cloud) -> Result<RigidPose, WhyNot> {
         let pose = self.look_up(cloud)?;
-        // What came since then may be of another clock, which passes the same stamps again.
+        // Transforms since then may be of a new clock that repeats the same stamps.
         let mut off = self.stamps.off().filter(|(_, since)| *since <= cloud.arrived).peekable();
         if off.peek().is_some() {
             let links = self.transforms.links_between(&self.fixed_frame, &cloud.frame, cloud.stamp_ns)?;
@@ -214,7 +216,7 @@ impl TransformBuffer {
     }
 
     fn look_up(&self, cloud: &Cloud) -> Result<RigidPose, WhyNot> {
-        // A frame is at the origin of itself, and rays would begin there.
+        // Without a sensor position, the rays of a cloud in the map frame would begin at the origin.
         if bare(&cloud.frame) == self.fixed_frame {
             return Err(WhyNot::AlreadyFixed(self.fixed_frame.clone()));
         }
@@ -222,23 +224,23 @@ impl TransformBuffer {
     }
 }
 
-/// What others sent is printed without what a terminal obeys.
+/// Escapes control characters in received names.
 fn printable(why: &dyn std::fmt::Display) -> String {
     why.to_string().escape_debug().to_string()
 }
 
-/// What to do about clouds that get no pose, where that is not obvious.
+/// Returns additional advice for clouds without a pose, or an empty string.
 fn remedy(why: &WhyNot) -> &'static str {
     match why {
         WhyNot::AlreadyFixed(_) => {
-            ". Publish them in the frame of the sensor, with its transforms, or give with --frame-id a frame in which \
+            ". Publish clouds in the sensor frame with its transforms, or set --frame-id to a frame in which \
              the sensor moves"
         }
         _ => "",
     }
 }
 
-/// tf 1 wrote slashes before names, tf 2 does not know them.
+/// tf 1 has names with leading slashes, tf 2 does not.
 fn bare(frame: &str) -> &str {
     frame.trim_start_matches('/')
 }
@@ -272,7 +274,7 @@ mod tests {
     }
 
     #[test]
-    fn a_cloud_waits_for_the_transform_behind_its_stamp_and_then_is_dropped() {
+    fn a_cloud_waits_for_a_later_transform_and_is_dropped_after_the_limit() {
         let (mut buffer, mut counters) = (buffer(), Counters::default());
         let cloud = cloud(150_000_000);
         buffer.insert(
@@ -292,7 +294,7 @@ mod tests {
             &mut counters,
         );
         assert_eq!(buffer.verdict(&cloud, cloud.arrived), Verdict::Waits);
-        assert_eq!(buffer.verdict(&cloud, cloud.arrived + Duration::from_secs(2)), Verdict::Hopeless);
+        assert_eq!(buffer.verdict(&cloud, cloud.arrived + Duration::from_secs(2)), Verdict::Expired);
         buffer.insert(
             &pose("map", "base", 200_000_000, 2.0),
             false,
@@ -307,7 +309,7 @@ mod tests {
     }
 
     #[test]
-    fn a_stamp_in_the_future_costs_no_history_and_a_restart_forgets_it() {
+    fn a_future_stamp_keeps_history_and_a_restart_clears_it() {
         const S: i64 = 1_000_000_000;
         let (mut buffer, mut counters, start) = (buffer(), Counters::default(), Instant::now());
         buffer.insert(&pose("base", "lidar", 0, 1.0), true, None, start, &mut queue(), &mut counters);
@@ -327,7 +329,7 @@ mod tests {
                 _ => None,
             };
         assert_eq!(found(&mut buffer, 60 * S), Some(4.0));
-        // The simulation begins anew, and passes the same stamps.
+        // The simulation restarts and repeats the same stamps.
         for number in 3000..6000 {
             tick(&mut buffer, number, 5 * S + (number - 3000) * S / 50 + 7, 5.0);
         }
@@ -337,7 +339,7 @@ mod tests {
     }
 
     #[test]
-    fn a_frame_whose_clock_falls_back_costs_the_others_no_history() {
+    fn a_clock_that_jumps_back_keeps_the_history_of_other_frames() {
         const S: i64 = 1_000_000_000;
         let (mut buffer, mut counters, start) = (buffer(), Counters::default(), Instant::now());
         buffer.insert(&pose("base", "lidar", 0, 1.0), true, None, start, &mut queue(), &mut counters);
@@ -357,7 +359,7 @@ mod tests {
     }
 
     #[test]
-    fn a_flood_of_frames_fills_the_buffer_and_no_more() {
+    fn a_flood_of_frames_is_limited_by_the_buffer() {
         let (mut buffer, mut counters) = (buffer(), Counters::default());
         for frame in 0..MAX_FRAMES + 7 {
             buffer.insert(
@@ -370,17 +372,17 @@ mod tests {
             );
         }
         assert_eq!((buffer.transforms.frames(), counters.transforms_refused), (1507, 500));
-        // What was named last is still known.
+        // The last frame is still known.
         let last = format!("f{}", MAX_FRAMES + 6);
         buffer.insert(&pose("map", &last, 1, 0.0), false, None, Instant::now(), &mut queue(), &mut counters);
         assert_eq!((buffer.transforms.frames(), counters.transforms_refused), (1507, 500));
     }
 
     #[test]
-    fn unknown_frames_do_not_crowd_out_the_robots_own() {
+    fn unknown_frames_do_not_displace_the_robots_frames() {
         const S: i64 = 1_000_000_000;
         let [flood, robot, state] = [1, 2, 3].map(|k| Some(Gid([k; 16])));
-        // Before the robot's own, and after them, by publishers that are known and not.
+        // The flood comes before and after the robot's transforms, from known and unknown publishers.
         for publishers in [[flood, robot, state], [None; 3]] {
             let [flood, robot, state] = publishers;
             let (mut buffer, mut counters, start) = (buffer(), Counters::default(), Instant::now());
@@ -394,7 +396,7 @@ mod tests {
                 put(&mut buffer, &pose("x", &format!("f{k}"), 0, 0.0), k % 2 == 0, flood);
             }
             put(&mut buffer, &pose("base", "lidar", 0, 1.0), true, state);
-            // A loop above the frame of the map, and a cloud that waits.
+            // A loop above the map frame, and a waiting cloud.
             put(&mut buffer, &pose("world", "map", 0, 9.0), true, flood);
             put(&mut buffer, &pose("map", "world", 0, 9.0), true, flood);
             assert_eq!(buffer.verdict(&cloud(S / 2), start), Verdict::Waits);
@@ -409,9 +411,9 @@ mod tests {
         }
     }
 
-    /// The frames of the last pose are kept, however many others lead from the sensor to the map.
+    /// The frames of the last pose are kept, however many other frames connect the sensor to the map.
     #[test]
-    fn a_flood_above_the_sensor_costs_no_pose() {
+    fn a_flood_of_ancestors_of_the_sensor_keeps_its_pose() {
         const S: i64 = 1_000_000_000;
         let [flood, robot] = [1, 2].map(|k| Some(Gid([k; 16])));
         let (mut buffer, mut counters, start) = (buffer(), Counters::default(), Instant::now());
@@ -434,7 +436,7 @@ mod tests {
     }
 
     #[test]
-    fn who_floods_the_buffer_loses_its_own_past_alone() {
+    fn a_flooding_frame_loses_only_its_own_history() {
         const S: i64 = 1_000_000_000;
         let (mut buffer, mut counters, now) = (buffer(), Counters::default(), Instant::now());
         buffer.insert(&pose("base", "lidar", 0, 1.0), true, None, now, &mut queue(), &mut counters);
@@ -477,7 +479,7 @@ mod tests {
         }
         assert!(counters.transforms_refused >= MAX_SAMPLES as u64, "{counters}");
         assert!(buffer.transforms.forget_older_than(SPAN_NS) <= MAX_SAMPLES);
-        // Parents are samples, too.
+        // A change of parents adds samples too.
         for parent in 0..MAX_SAMPLES + 2 * FORGET_EVERY {
             let pose = pose(&format!("p{parent}"), "flood", 0, 0.0);
             buffer.insert(&pose, true, None, now, &mut queue(), &mut counters);
@@ -487,11 +489,11 @@ mod tests {
     }
 
     #[test]
-    fn transforms_that_make_loops_cost_no_cloud_and_few_warnings() {
+    fn loops_drop_no_cloud_and_cause_few_warnings() {
         const S: i64 = 1_000_000_000;
         let (mut buffer, mut counters, mut queue, start) =
             (buffer(), Counters::default(), queue(), Instant::now());
-        // Before all others, between them, and a thousand times a second.
+        // Wrong transforms arrive before and between the others, and 1000 times a second.
         let wrong = [("lidar", "map"), ("base", "map"), ("lidar", "base"), ("lidar", "odom"), ("x", "lidar")];
         let mut put = |buffer: &mut TransformBuffer, parent: &str, child: &str, stamp_ns: i64, is_static| {
             let now = start + Duration::from_nanos(stamp_ns as u64);
@@ -524,22 +526,22 @@ mod tests {
     }
 
     #[test]
-    fn what_keeps_all_clouds_from_their_poses_is_reported() {
+    fn the_reason_for_missing_poses_is_reported() {
         let (mut buffer, mut counters) = (buffer(), Counters::default());
         let now = Instant::now();
         buffer.insert(&pose("base", "lidar", 0, 1.0), true, None, now, &mut queue(), &mut counters);
-        let mut lost = |seconds| {
+        let mut problem_after = |seconds| {
             let now = now + Duration::from_secs(seconds);
             buffer.verdict(&Cloud { arrived: now, ..cloud(0) }, now);
-            buffer.trouble()
+            buffer.problem()
         };
-        assert_eq!((lost(0), lost(2)), (None, None));
+        assert_eq!((problem_after(0), problem_after(2)), (None, None));
         let why = "no cloud gets a pose: no transform names the frame map (a cloud of lidar in map)";
-        assert_eq!(lost(4).as_deref(), Some(why));
+        assert_eq!(problem_after(4).as_deref(), Some(why));
     }
 
     #[test]
-    fn a_long_name_is_no_frame() {
+    fn long_frame_names_are_refused() {
         let (mut buffer, mut counters) = (buffer(), Counters::default());
         buffer.insert(
             &pose("map", &"x".repeat(1 << 20), 0, 0.0),
@@ -553,7 +555,7 @@ mod tests {
     }
 
     #[test]
-    fn clouds_that_wait_for_long_keep_the_poses_that_they_had() {
+    fn clouds_that_wait_long_keep_their_poses() {
         const S: i64 = 1_000_000_000;
         let (mut buffer, mut counters, mut queue, start) =
             (buffer(), Counters::default(), queue(), Instant::now());
@@ -564,20 +566,20 @@ mod tests {
         };
         queue.push(cloud(2 * S), &mut Counters::default());
         queue.push(cloud(70 * S + S / 100), &mut Counters::default());
-        // The mapper comes to them after two minutes.
+        // The clouds are taken after two minutes.
         (0..6000).for_each(|number| tick(&mut buffer, &mut queue, number));
         let now = start + Duration::from_secs(120);
         let mut take = || queue.take_ready(&mut Counters::default(), |cloud| buffer.verdict(cloud, now));
-        let mut places_m = Vec::new();
+        let mut positions_m = Vec::new();
         while let Some((_, pose)) = take() {
-            places_m.push(pose.position_m[0]);
+            positions_m.push(pose.position_m[0]);
         }
-        assert_eq!(places_m.len(), 2);
-        assert!((places_m[0] - 2.0).abs() + (places_m[1] - 70.01).abs() < 1e-9, "{places_m:?}");
+        assert_eq!(positions_m.len(), 2);
+        assert!((positions_m[0] - 2.0).abs() + (positions_m[1] - 70.01).abs() < 1e-9, "{positions_m:?}");
     }
 
     #[test]
-    fn a_cloud_of_a_clock_that_has_gone_back_gets_no_pose_of_before() {
+    fn a_cloud_after_a_clock_reset_gets_no_earlier_pose() {
         const S: i64 = 1_000_000_000;
         let (mut buffer, mut counters, mut queue, start) =
             (buffer(), Counters::default(), queue(), Instant::now());
@@ -589,7 +591,7 @@ mod tests {
         let before = Cloud { arrived: at(299), ..cloud(5 * S + S / 100) };
         queue.push(before.clone(), &mut Counters::default());
         assert!(matches!(buffer.verdict(&before, at(299)), Verdict::Ready(_)));
-        // A bag is played again, from its second on.
+        // A bag is replayed from its first second.
         tick(&mut buffer, &mut queue, 300, S, 9.0);
         let again = Cloud { arrived: at(301), ..cloud(2 * S + S / 100) };
         assert_eq!(buffer.verdict(&again, at(301)), Verdict::Waits);

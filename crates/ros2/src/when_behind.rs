@@ -1,11 +1,11 @@
-/// What becomes of clouds that come faster than they can be mapped.
+/// Action if clouds arrive faster than they are mapped.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum, serde::Deserialize, serde::Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum WhenBehind {
-    /// Readers wait for room; what DDS cannot keep meanwhile is lost unseen.
+    /// Wait for free memory; clouds that the transport drops meanwhile are not counted.
     Wait,
-    /// The oldest cloud that waits makes room.
+    /// Drop the oldest waiting cloud.
     DropOldest,
-    /// While the queue is over half full, every second cloud of a topic is left out; then as `drop-oldest`.
+    /// While the queue is over half full, skip every second cloud of a topic; if it is full, drop the oldest.
     Thin,
 }

@@ -1,4 +1,4 @@
-"""Types that the node uses, beside those that rosbags knows, as their packages define them; their hashes."""
+"""Definitions of types that the node uses and rosbags lacks, and hashes of all types that it uses."""
 
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
@@ -8,7 +8,7 @@ HIT = OUTCOME + "bool hit\ngeometry_msgs/Point center\nfloat64 distance\nfloat64
 OCTOMAP = "std_msgs/Header header\nbool binary\nstring id\nfloat64 resolution\nint8[] data\n"
 EVENT_INFO = "uint8 event_type\nbuiltin_interfaces/Time stamp\nuint8[16] client_gid\nint64 sequence_number\n"
 
-# Request and response; those of voxtile_msgs as docs/ros2.md has them.
+# Request and response. docs/ros2.md defines those of voxtile_msgs.
 SERVICES = {
     "std_srvs/Trigger": ("", OUTCOME),
     "std_srvs/Empty": ("", ""),
@@ -41,13 +41,13 @@ MESSAGES = [
 
 
 def full(name, kind):
-    """`std_msgs/msg/String` of `std_msgs/String`."""
+    """Returns `std_msgs/msg/String` for `std_msgs/String`."""
     package, own = name.split("/")
     return f"{package}/{kind}/{own}"
 
 
 def parts_of_services(text, name):
-    """Definitions whose names have `/srv/`: rosbags puts `msg` behind it."""
+    """Returns definitions whose names contain `/srv/`, without the `msg` that rosbags inserts after it."""
 
     def plain(part):
         if isinstance(part, str):
@@ -58,10 +58,10 @@ def parts_of_services(text, name):
 
 
 def typestore():
-    """ROS's own definitions and these. A service is a message of three: request, response and event (REP 2011)."""
+    """Returns the definitions of ROS and of this file. A service consists of request, response and event (REP 2011)."""
     store = get_typestore(Stores.ROS2_JAZZY)
     store.register(get_types_from_msg(OCTOMAP, "octomap_msgs/msg/Octomap"))
-    # ROS hashes `char` as the `uint8` that IDL makes of it; rosbags does not.
+    # ROS hashes `char` as `uint8`, its IDL type; rosbags does not.
     store.fielddefs.update(get_types_from_msg(EVENT_INFO, "service_msgs/msg/ServiceEventInfo"))
     for name, halves in SERVICES.items():
         own = full(name, "srv")
@@ -76,6 +76,6 @@ def typestore():
 
 
 def hashes(store):
-    """The hash of each type that the node uses, by its name."""
+    """Returns the hash of each type that the node uses, by name."""
     names = [(name, "msg") for name in MESSAGES] + [(name, "srv") for name in SERVICES]
     return {name: store.hash_rihs01(full(name, kind)) for name, kind in names}

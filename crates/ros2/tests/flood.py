@@ -1,7 +1,7 @@
-"""Sends a node more clouds than its queue takes, without transforms for them; then transforms for those that are left.
+"""Sends a node more clouds than its queue holds without transforms, then the transforms for the remaining ones.
 
-flood.py DOMAIN CLOUDS PID   prints, as the node tells: by how many bytes its memory grew at most; clouds received,
-                               dropped, waiting and mapped; then, of those that waited, mapped and without a pose
+flood.py DOMAIN CLOUDS PID   prints the growth of the node's peak memory; the clouds received, dropped, waiting and
+                               mapped; and of the waiting ones those mapped and without a pose
 """
 
 import sys
@@ -22,16 +22,16 @@ def peak_bytes(pid):
 
 
 def values(reader, seconds):
-    """What the node tells in so many seconds, last."""
-    until, told = time.time() + seconds, None
-    while time.time() < until or told is None:
+    """Returns the last diagnostics within this number of seconds."""
+    until, last = time.time() + seconds, None
+    while time.time() < until or last is None:
         for message in reader.take(10):
             if hasattr(message, "status"):
-                told = {value.key: value.value for value in message.status[0].values}
+                last = {value.key: value.value for value in message.status[0].values}
         time.sleep(0.05)
         if time.time() > until + 20:
-            sys.exit("the node tells nothing")
-    return told
+            sys.exit("the node publishes no diagnostics")
+    return last
 
 
 def main():
@@ -44,21 +44,21 @@ def main():
     still = writer("rt/tf_static", TFMessage, RELIABLE, LATCHED, Policy.History.KeepLast(1))
     moving = writer("rt/tf", TFMessage, RELIABLE, VOLATILE, Policy.History.KeepLast(100))
     flood = writer("rt/cloud_in", PointCloud2, BEST, VOLATILE, Policy.History.KeepLast(5))
-    told = DataReader(participant, Topic(participant, "rt/diagnostics", DiagnosticArray), qos=Qos(RELIABLE))
+    diagnostics = DataReader(participant, Topic(participant, "rt/diagnostics", DiagnosticArray), qos=Qos(RELIABLE))
     until = time.time() + 20
     while not all(one.get_matched_subscriptions() for one in [still, moving, flood]):
         if time.time() > until:
             sys.exit("no node answers")
         time.sleep(0.02)
     still.write(TFMessage([transform(0, "base", "lidar", 0.2, 0.1)]))
-    values(told, 1.5)
+    values(diagnostics, 1.5)
     before = peak_bytes(pid)
     plain = cloud(0, 1)
     for number in range(clouds):
         plain.header = header(1_000_000 * number, "lidar")
         flood.write(plain)
         time.sleep(0.001)
-    full = values(told, 2.5)
+    full = values(diagnostics, 2.5)
     grown = peak_bytes(pid) - before
     for tick in range(clouds // 20 + 10):
         stamp_ns = (tick - 5) * 20_000_000
@@ -66,9 +66,9 @@ def main():
             moving.write(TFMessage([transform(stamp_ns, "map", "base", 0.01 * tick, 0.0)]))
         time.sleep(0.002)
     until = time.time() + 120
-    while int((last := values(told, 1.5))["clouds_waiting"]) > 0:
+    while int((last := values(diagnostics, 1.5))["clouds_waiting"]) > 0:
         if time.time() > until:
-            sys.exit(f"clouds still wait: {last}")
+            sys.exit(f"clouds are still waiting: {last}")
     counts = [full[key] for key in ["clouds_received", "dropped_behind", "clouds_waiting", "clouds_mapped"]]
     print(grown, *counts, *(last[key] for key in ["clouds_mapped", "dropped_without_pose"]))
 

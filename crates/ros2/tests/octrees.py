@@ -1,4 +1,4 @@
-"""OctoMap's octrees as messages have them, read after OctoMap's sources and not by the library under test."""
+"""Reads OctoMap's octrees from messages, according to OctoMap's sources and independent of the library under test."""
 
 import struct
 
@@ -12,7 +12,7 @@ def octets(data):
 
 
 def binary_leaves(data):
-    """Leaves of a tree in OctoMap's binary form: key of the lowest voxel, depth, whether it is occupied."""
+    """Returns the leaves of a tree in binary form: key of the lowest voxel, depth, whether it is occupied."""
     at, leaves = 0, []
 
     def node(key, depth):
@@ -23,7 +23,7 @@ def binary_leaves(data):
         for child in range(8):
             half = 1 << (DEPTH - depth - 1)
             below = [key[k] + half * (child >> k & 1) for k in range(3)]
-            # Two bits a child: the first says free, the second occupied, both that there is more below.
+            # Two bits per child: 01 is free, 10 is occupied, 11 is an inner node.
             state = bits >> (2 * child) & 3
             if state == 3:
                 inner.append(below)
@@ -38,7 +38,7 @@ def binary_leaves(data):
 
 
 def full_leaves(data):
-    """The same of a tree with log-odds: key of the lowest voxel, depth, log-odds."""
+    """Returns the leaves of a tree with log-odds: key of the lowest voxel, depth, log-odds."""
     at, leaves = 0, []
 
     def node(key, depth):
@@ -58,7 +58,7 @@ def full_leaves(data):
 
 
 def voxels_of(leaves):
-    """Voxel by voxel, by index."""
+    """Returns the value of each voxel by its index."""
     voxels = {}
     for key, depth, value in leaves:
         edge = range(1 << (DEPTH - depth))

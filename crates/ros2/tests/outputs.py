@@ -1,10 +1,10 @@
-"""What the node publishes, as an independent peer (Cyclone DDS) gets and reads it.
+"""Receives the node's outputs with an independent peer (Cyclone DDS) and compares them with exports.
 
-outputs.py listen DOMAIN FILE SECONDS [TOPIC ...]   writes the last message of each topic, and how many there were; of
-                                                    changes what they come to
+outputs.py listen DOMAIN FILE SECONDS [TOPIC ...]   writes the last message and the number of messages of each topic;
+                                                    changes are accumulated
 outputs.py compare FILE ALL.csv MAP.pgm CLOUDS RADIUS MAX_Z live|rest RANGE
-                                                    compares them with what `voxtile export` writes
-outputs.py whole FILE ALL.csv   compares octomap_full, of a box around the whole map, likewise
+                                                    compares them with the output of `voxtile export`
+outputs.py whole FILE ALL.csv   compares octomap_full, of a box around the whole map
 """
 
 import csv
@@ -37,7 +37,7 @@ CHANGES = "octomap_point_cloud_changes"
 
 
 class Viewer:
-    """Puts changes together."""
+    """Accumulates changes."""
 
     def __init__(self):
         self.occupied, self.points = set(), []
@@ -58,7 +58,7 @@ class Viewer:
 
 
 def plain(name, message):
-    """A message as numbers and texts."""
+    """Converts a message to numbers and strings."""
     if name == "occupied_cells_vis_array":
         [marker] = message.markers
         points = [[point.x, point.y, point.z] for point in marker.points]
@@ -82,18 +82,18 @@ def plain(name, message):
 
 
 class Taken:
-    """The last message of each topic, and how many came."""
+    """Last message and number of messages of each topic."""
 
     def __init__(self):
         self.got, self.viewer, self.store = {}, Viewer(), typestore()
 
     def take(self, name, message, cdr):
-        # The classes here are those of ROS.
+        # Check that rosbags decodes the message with ROS's definitions, too.
         own = name.split("/")[-1]
         self.store.deserialize_cdr(cdr, TYPES[own][1])
         count = self.got.get(name, {"count": 0})["count"] + 1
-        told = self.viewer.take(message) if own == CHANGES else plain(own, message)
-        self.got[name] = {"count": count, "message": told}
+        content = self.viewer.take(message) if own == CHANGES else plain(own, message)
+        self.got[name] = {"count": count, "message": content}
 
     def write(self, file):
         with open(file, "w") as out:
@@ -118,7 +118,7 @@ def listen(domain, file, seconds, topics):
 
 
 def pgm_cells(path):
-    """nav2's picture as cells of a message: row by row from below."""
+    """Reads an image for nav2 as cells of a message, from the lowest row up."""
     data = open(path, "rb").read()
     magic, size, most, pixels = data.split(b"\n", 3)
     assert (magic, most) == (b"P5", b"255")
@@ -128,8 +128,8 @@ def pgm_cells(path):
     return [width, height], [states[int(pixel)] for pixel in rows.flatten()]
 
 
-def last_place(clouds):
-    """Where peer.py has the sensor at its last cloud."""
+def last_position(clouds):
+    """Returns the sensor position at the last cloud of peer.py."""
     ticks = 5 * (clouds - 1) + 0.35
     yaw = 0.02 * ticks
     x, y = 0.2 * np.cos(yaw) - 0.5 * np.sin(yaw), 0.2 * np.sin(yaw) + 0.5 * np.cos(yaw)
@@ -140,17 +140,17 @@ INFLATION_M = 0.2
 
 
 def compare_local(got, occupied, centers, origin, radius, moment, inflation_range, resolution):
-    """What is inflated is what a ball around the occupied voxels near to the sensor reaches; after a start the local
-    map begins with what the map knows."""
+    """Checks the local map: inflated voxels are within the radius of occupied voxels near the sensor. After a start it
+    equals the map near the sensor."""
     local, inflated = (
         {tuple(round(at / resolution - 0.5) for at in point) for point in got[name]["points"]}
         for name in ["local_occupied", "local_inflated"]
     )
     if moment == "rest":
         near = {index for index in occupied if np.linalg.norm(np.subtract(centers[index], origin)) <= radius}
-        assert local == near, f"{len(local)} voxels in the local map, and {len(near)} near in the map"
+        assert local == near, f"{len(local)} voxels in the local map, but {len(near)} in this part of the map"
     else:
-        assert len(local) > 100 and len(local & occupied) > 0.8 * len(local), "the local map is another one"
+        assert len(local) > 100 and len(local & occupied) > 0.8 * len(local), "the local map differs"
     reach = int(INFLATION_M / resolution + 1)
     cube = [np.array([x, y, z]) for x, y, z in np.ndindex(*[2 * reach + 1] * 3)]
     ball = [at - reach for at in cube if np.linalg.norm(at - reach) * resolution <= INFLATION_M * (1 + 1e-9)]
@@ -158,20 +158,20 @@ def compare_local(got, occupied, centers, origin, radius, moment, inflation_rang
     sources = [index for index in local if np.linalg.norm(center[index] - origin) <= inflation_range]
     assert 0 < len(sources) < len(local)
     wanted = {tuple(int(at) for at in np.add(index, offset)) for index in sources for offset in ball} | local
-    # What inflates into the box from outside is not known here.
+    # Voxels near the border of the box may be inflated from outside, so they are not compared.
     inner = [np.ceil((origin[k] - radius + INFLATION_M) / resolution) for k in range(3)]
     outer = [np.floor((origin[k] + radius - INFLATION_M) / resolution) - 1 for k in range(3)]
     wanted, found = (
         {index for index in indices if all(inner[k] <= index[k] <= outer[k] for k in range(3))}
         for indices in [wanted, inflated]
     )
-    assert found == wanted, f"{len(found)} inflated voxels, and {len(wanted)} are near to occupied ones"
+    assert found == wanted, f"{len(found)} inflated voxels instead of {len(wanted)}"
     return f"{len(local)} voxels in the local map and {len(inflated)} inflated"
 
 
 def compare(file, all_csv, pgm, origin, radius, max_z, moment, inflation_range):
     got = {name: one["message"] for name, one in json.load(open(file)).items()}
-    assert set(got) == set(TYPES), f"only {sorted(got)} came"
+    assert set(got) == set(TYPES), f"received only {sorted(got)}"
     assert all(one["frame"] == "map" for one in got.values())
     resolution = got["octomap_full"]["resolution"]
     log_odds, centers = {}, {}
@@ -187,7 +187,7 @@ def compare(file, all_csv, pgm, origin, radius, max_z, moment, inflation_range):
     binary, full = got["octomap_binary"], got["octomap_full"]
     assert (binary["binary"], full["binary"], binary["id"], full["id"]) == (True, False, "OcTree", "OcTree")
     found = voxels_of(binary_leaves(bytes.fromhex(binary["data"])))
-    assert found == {index: index in occupied for index in log_odds}, "octomap_binary is another map"
+    assert found == {index: index in occupied for index in log_odds}, "octomap_binary differs"
     found = voxels_of(full_leaves(bytes.fromhex(full["data"])))
     assert found == {index: float(np.float32(value)) for index, value in log_odds.items()}, "octomap_full differs"
 
@@ -197,14 +197,14 @@ def compare(file, all_csv, pgm, origin, radius, max_z, moment, inflation_range):
         points = [tuple(round(at / resolution - 0.5) for at in point) for point in got[name]["points"]]
         assert sorted(points) == low, f"{name} has {len(points)} voxels, the map {len(low)}"
     changes = got[CHANGES]["changes"]
-    assert moment == "rest" or max(changes[5:], default=len(low)) < len(low) / 2, f"{changes}: more than changed"
+    assert moment == "rest" or max(changes[5:], default=len(low)) < len(low) / 2, f"too many changes: {changes}"
     markers = got["occupied_cells_vis_array"]
     assert (markers["type"], markers["action"], markers["scale"]) == (6, 0, [resolution] * 3)
 
     grid = got["projected_map"]
     size, cells = pgm_cells(pgm)
-    assert (grid["size"], grid["turn"]) == (size, 1.0), f"{grid['size']} cells, and the picture has {size}"
-    assert grid["cells"] == cells, "projected_map is another map"
+    assert (grid["size"], grid["turn"]) == (size, 1.0), f"{grid['size']} cells, but the image has {size}"
+    assert grid["cells"] == cells, "projected_map differs"
     corner = [float(at) for at in open(pgm.replace(".pgm", ".yaml")).read().split("origin: [")[1].split(",")[:2]]
     assert grid["origin"] == [*corner, 0.0], f"{grid['origin']} and {corner}"
     local = compare_local(got, occupied, centers, origin, radius, moment, inflation_range, resolution)
@@ -217,7 +217,7 @@ def compare_whole(file, all_csv):
     for row in csv.DictReader(open(all_csv)):
         index = tuple(round(float(row[axis]) / resolution - 0.5) for axis in "xyz")
         log_odds[index] = float(np.float32(float(row["log_odds"])))
-    assert voxels_of(full_leaves(bytes.fromhex(got["data"]))) == log_odds, "octomap_full is another map"
+    assert voxels_of(full_leaves(bytes.fromhex(got["data"]))) == log_odds, "octomap_full differs"
     print(f"outputs: {len(log_odds)} voxels in octomap_full")
 
 
@@ -229,7 +229,7 @@ def main():
     else:
         radius, max_z = map(float, sys.argv[6:8])
         moment, inflation_range = sys.argv[8], float(sys.argv[9])
-        compare(*sys.argv[2:5], last_place(int(sys.argv[5])), radius, max_z, moment, inflation_range)
+        compare(*sys.argv[2:5], last_position(int(sys.argv[5])), radius, max_z, moment, inflation_range)
 
 
 if __name__ == "__main__":

@@ -2,14 +2,14 @@
 
 peer.py DOMAIN BAG CLOUDS [hostile | types | variants | odometry | sensors | path | real FOLDER]
 
-variants: the same points as organised clouds, big-endian, in double precision with fields in another order.
-hostile: clouds that lie, and transforms that make loops, before each one.
-types: others offer and want the same topics with other types.
-odometry: poses come as nav_msgs/Odometry, and only the mount of the sensor by tf.
-sensors: two sensors with their mounts, so far apart that their clouds do not overlap.
-rclpy: clouds in the frame of the odometry, and no tf: what rclpy_peer.py plays.
-path: after the first CLOUDS a corrected path of them comes, which BAG.tum gets too; others follow at once.
-real: the PCD files of a folder, at its poses (poses_tum.txt).
+variants: the same points in organised clouds, big-endian, or in double precision with another order of fields.
+hostile: sends a malformed cloud and transforms that form loops before each cloud.
+types: other participants publish and subscribe to the same topics with other types.
+odometry: sends poses as nav_msgs/Odometry, and only the sensor mount on tf.
+sensors: two sensors whose clouds do not overlap, with their mounts.
+rclpy: clouds in the child frame of the odometry, without tf; used by rclpy_peer.py.
+path: sends a corrected path after the first CLOUDS, also written to BAG.tum; more clouds follow at once.
+real: the PCD files of a folder with its poses (poses_tum.txt).
 """
 
 import pathlib
@@ -62,7 +62,7 @@ def transform(stamp_ns, parent, child, x, yaw):
 
 
 def cloud(stamp_ns, seed):
-    """A room of 8 m x 6 m x 3 m as a turning sensor sees it; every 50th ray comes back with nothing."""
+    """Returns a cloud of a rotating sensor in a room of 8 m x 6 m x 3 m. Every 50th ray has no return."""
     random = np.random.default_rng(seed)
     rays = random.normal(size=(2000, 3))
     rays /= np.linalg.norm(rays, axis=1, keepdims=True)
@@ -77,10 +77,10 @@ def cloud(stamp_ns, seed):
 
 
 def variant(plain, number):
-    """The same points in another layout."""
+    """Returns the same points in another layout."""
     points = np.frombuffer(plain.data, "<f4").reshape(-1, 4)
     if number % 3 == 0:
-        # Organised, with room behind each row.
+        # Organised, with padding after each row.
         rows = points.reshape(4, -1).view(np.uint8).reshape(4, -1)
         data = np.pad(rows, ((0, 0), (0, 24)), constant_values=255).tobytes()
         return PointCloud2(plain.header, 4, 500, plain.fields, False, 16, len(data) // 4, data, False)
@@ -97,7 +97,7 @@ def variant(plain, number):
 
 
 def real_messages(clouds, folder):
-    """A recording: each cloud comes with the pose at its stamp."""
+    """Yields the messages of a recording: each cloud with the pose at its stamp."""
     poses = [line.split() for line in open(folder / "poses_tum.txt") if not line.startswith("#")]
     files = sorted((folder / "scans").glob("*.pcd"))
     for tick, (file, pose) in enumerate(list(zip(files, poses))[:clouds]):
@@ -113,7 +113,7 @@ def real_messages(clouds, folder):
 
 
 def messages(clouds, kind, folder):
-    """Topic and message, in the order in which a robot sends them: transforms at 50 Hz, clouds at 10 Hz between."""
+    """Yields topics and messages in the order of a robot: transforms at 50 Hz, clouds at 10 Hz between them."""
     if kind == "real":
         yield from real_messages(clouds, pathlib.Path(folder))
         return
@@ -153,7 +153,7 @@ TYPES = {
 
 
 def loops(stamp_ns):
-    """Transforms that make loops with those of the robot, or with each other, or are none, among good ones."""
+    """Returns transforms that form loops with those of the robot or with each other, and invalid ones."""
     pairs = [("lidar", "map"), ("base", "map"), ("lidar", "base"), ("odom", "odom"), ("", "base"), ("lost", "lidar")]
     wrong = [transform(stamp_ns, parent, child, 7.0, 1.0) for parent, child in pairs]
     bent = transform(stamp_ns, "odom", "base", 0.0, 0.0)
@@ -162,7 +162,7 @@ def loops(stamp_ns):
 
 
 def corrected_path(clouds):
-    """Poses of the sensor at its clouds, further and further from where tf had it; in between some that are of none."""
+    """Returns sensor poses at the stamps of clouds, with increasing drift, and a path with an additional pose."""
     poses = []
     for number in range(clouds):
         drift, yaw = 0.01 * number, 0.1 + 0.03 * number
@@ -173,7 +173,7 @@ def corrected_path(clouds):
     return poses, Path(header(0, "map"), poses[:1] + [lost] + poses[1:])
 
 
-# Clouds after the path.
+# Number of clouds after the path.
 LATER = 20
 
 
@@ -186,30 +186,30 @@ def write_tum(file, poses):
 
 
 def topics_of(kind):
-    """The topics of a robot."""
+    """Returns the topics that a robot publishes."""
     if kind == "rclpy":
         return ["/odom", "/cloud_in"]
     poses = "/odom" if kind == "odometry" else "/tf"
     return ["/tf_static", poses, "/cloud_in"] + (["/rear"] if kind == "sensors" else [])
 
 
-def strangers(domain):
-    """Others that use the node's topics with other types: they send some, and want what is published."""
+def other_types(domain):
+    """Creates writers and readers of the node's topics with other types."""
     participant = DomainParticipant(domain)
-    made = []
+    writers = []
     for name, kind in [("cloud_in", String), ("tf", PointCloud2), ("tf_static", String)]:
-        made.append((DataWriter(participant, Topic(participant, "rt/" + name, kind), qos=Qos(RELIABLE)), kind))
+        writers.append((DataWriter(participant, Topic(participant, "rt/" + name, kind), qos=Qos(RELIABLE)), kind))
     latched = Qos(RELIABLE, LATCHED, Policy.History.KeepLast(1))
     wanted = [DataReader(participant, Topic(participant, "rt/" + name, String), qos=latched) for name in PUBLISHED]
-    return participant, made, wanted
+    return participant, writers, wanted
 
 
 PUBLISHED = ["octomap_binary", "projected_map", "local_inflated"]
 
 
-def speak(made, message):
-    """What they send."""
-    for writer, kind in made:
+def send_other_types(writers, message):
+    """Sends messages of other types."""
+    for writer, kind in writers:
         writer.write(String("x" * 1000) if kind is String else message)
 
 
@@ -243,7 +243,7 @@ def main():
         writers["/rear"] = writer("/rear", PointCloud2, BEST, VOLATILE, Policy.History.KeepLast(5))
     if kind == "path":
         writers["/slam_path"] = writer("/slam_path", Path, RELIABLE, VOLATILE, Policy.History.KeepLast(1))
-    others = strangers(domain) if kind == "types" else None
+    others = other_types(domain) if kind == "types" else None
     until = time.time() + 20
     while not all(one.get_matched_subscriptions() for one in writers.values()):
         if time.time() > until:
@@ -255,23 +255,23 @@ def main():
         if more and name == "/cloud_in":
             sent += 1
             if sent == clouds + 1:
-                # Until all before is mapped.
+                # Wait until the earlier clouds are mapped.
                 time.sleep(1.5)
                 poses, path = corrected_path(clouds)
                 write_tum(f"{bag}.tum", poses)
                 writers["/slam_path"].write(path)
                 time.sleep(0.3)
         if kind == "hostile" and name == "/cloud_in":
-            liar = cloud(0, 1)
-            liar.header.stamp = message.header.stamp
-            liar.height = liar.width = liar.row_step = 2**32 - 1
-            writers[name].write(liar)
-            liar.fields = []
-            writers[name].write(liar)
+            malformed = cloud(0, 1)
+            malformed.header.stamp = message.header.stamp
+            malformed.height = malformed.width = malformed.row_step = 2**32 - 1
+            writers[name].write(malformed)
+            malformed.fields = []
+            writers[name].write(malformed)
             stamp = message.header.stamp
             writers["/tf"].write(loops((stamp.sec - START_S) * 10**9 + stamp.nanosec))
         if others and name == "/cloud_in":
-            speak(others[1], message)
+            send_other_types(others[1], message)
         writers[name].write(message)
         time.sleep(0.05 if kind == "real" else 0.02)
     time.sleep(3.0 if kind == "path" else 1.5)

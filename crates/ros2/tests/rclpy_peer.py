@@ -1,5 +1,5 @@
-"""A node of ROS 2 itself (rclpy of Jazzy over Fast DDS, from PyPI): publishes clouds and odometry, and uses what the node
-publishes and serves as others would.
+"""Node of ROS 2 itself (rclpy of Jazzy over Fast DDS, from PyPI): publishes clouds and odometry, and uses the node's
+topics and services.
 
 rclpy_peer.py DOMAIN BAG CLOUDS VOXTILE MAP RADIUS MAX_Z
 """
@@ -40,12 +40,12 @@ class Peer:
         self.last = {}
         self.clouds = self.node.create_publisher(PointCloud2, "/cloud_in", qos_profile_sensor_data)
         self.odometry = self.node.create_publisher(Odometry, "/odom", 100)
-        self.hear(PointCloud2, "/octomap_point_cloud_centers", LATCHED)
-        self.hear(MarkerArray, "/occupied_cells_vis_array", LATCHED)
-        self.hear(PointCloud2, "/local_inflated", LATCHED)
-        self.hear(DiagnosticArray, "/diagnostics", 10)
+        self.keep_last(PointCloud2, "/octomap_point_cloud_centers", LATCHED)
+        self.keep_last(MarkerArray, "/occupied_cells_vis_array", LATCHED)
+        self.keep_last(PointCloud2, "/local_inflated", LATCHED)
+        self.keep_last(DiagnosticArray, "/diagnostics", 10)
 
-    def hear(self, kind, topic, qos):
+    def keep_last(self, kind, topic, qos):
         """Keeps the last message of a topic."""
         self.node.create_subscription(kind, topic, lambda message: self.last.update({topic: message}), qos)
 
@@ -62,7 +62,7 @@ class Peer:
 
     def call(self, kind, service):
         client = self.node.create_client(kind, f"{NODE}/{service}")
-        assert client.wait_for_service(20), f"{service} is not there"
+        assert client.wait_for_service(20), f"{service} is missing"
         answer = client.call_async(kind.Request())
         self.wait(f"{service} does not answer", answer.done)
         return answer.result()
@@ -80,7 +80,7 @@ def indices(points, resolution):
 
 
 def check_outputs(peer, voxtile, folder, origin, radius, max_z):
-    """What came is what `voxtile export` writes of the map, which was saved."""
+    """Compares the received messages with the output of `voxtile export` of the saved map."""
     all_csv, pgm = f"{folder}.csv", f"{folder}.pgm"
     for command in [["export", folder, "-o", all_csv], ["export", folder, "-o", pgm, "--z-max", str(max_z)]]:
         subprocess.run([voxtile, *command], check=True, stdout=subprocess.DEVNULL)
@@ -102,15 +102,15 @@ def check_outputs(peer, voxtile, folder, origin, radius, max_z):
         [marker] = peer.last["/occupied_cells_vis_array"].markers
         return indices([[point.x, point.y, point.z] for point in marker.points], resolution)
 
-    # A busy machine takes its time.
+    # Retry, because updates may be delayed on a busy machine.
     for name, found in [("centers", centers), ("cubes", cubes)]:
         peer.wait(f"{name} are not the {len(wanted)} voxels of the map", lambda found=found: found() == wanted)
-    # As the static layer of nav2 does, later than everything.
-    peer.hear(OccupancyGrid, "/projected_map", LATCHED)
-    peer.wait("no flat map for who comes late", lambda: "/projected_map" in peer.last)
+    # Subscribe late, like the static layer of nav2.
+    peer.keep_last(OccupancyGrid, "/projected_map", LATCHED)
+    peer.wait("no projected_map for a late subscriber", lambda: "/projected_map" in peer.last)
     grid = peer.last["/projected_map"]
     size, cells = pgm_cells(pgm)
-    assert ([grid.info.width, grid.info.height], list(grid.data)) == (size, cells), "projected_map is another map"
+    assert ([grid.info.width, grid.info.height], list(grid.data)) == (size, cells), "projected_map differs"
     inflated = peer.last["/local_inflated"]
     assert inflated.header.frame_id == grid.header.frame_id == "odom" and inflated.width > len(wanted) / 2
     return f"{len(wanted)} voxels, {size} cells, {inflated.width} inflated"
@@ -129,21 +129,21 @@ def main():
     peer.spin(1.5)
     saved = peer.call(Trigger, "save")
     if saved.message != f"durable up to scan {clouds}":
-        # The shell looks whether the clouds were lost on the way.
+        # check.sh checks whether clouds were lost in transit.
         print(f"rclpy: {saved.message}")
         return
     assert saved.success
     peer.wait("no diagnostics", lambda: "/diagnostics" in peer.last)
     [status] = peer.last["/diagnostics"].status
     assert status.level == b"\0", status
-    # Where peer.py has it at the last cloud.
+    # Position at the last cloud of peer.py.
     origin = [0.01 * (5 * (clouds - 1) + 0.35), 0.5, 0.0]
-    told = check_outputs(peer, voxtile, folder, origin, radius, max_z)
-    print(f"rclpy: {told}")
-    # All is on disk: a copy of it shows what a build has to be.
+    summary = check_outputs(peer, voxtile, folder, origin, radius, max_z)
+    print(f"rclpy: {summary}")
+    # The map is flushed. check.sh compares this copy with the output of `voxtile build`.
     shutil.copytree(folder, f"{folder}.saved")
     peer.call(Empty, "reset")
-    peer.wait("what was cleared is still published", lambda: peer.last["/octomap_point_cloud_centers"].width == 0)
+    peer.wait("cleared voxels are still published", lambda: peer.last["/octomap_point_cloud_centers"].width == 0)
     rclpy.shutdown()
 
 

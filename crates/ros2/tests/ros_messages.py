@@ -1,4 +1,4 @@
-"""Messages of ROS 2 for Cyclone DDS, written after their definitions and not after the node's; and how to reach it."""
+"""Messages of ROS 2 for Cyclone DDS, written from their definitions, and the configuration of Cyclone DDS."""
 
 import os
 
@@ -241,12 +241,12 @@ class DiagnosticArray(IdlStruct, typename="diagnostic_msgs::msg::dds_::Diagnosti
     status: sequence[DiagnosticStatus]
 
 
-# Who asks and the number of the question come first in requests and responses of Cyclone DDS.
+# Requests and responses of Cyclone DDS begin with the client's GUID and the sequence number.
 MARKS = {"guid": uint64, "number": int64}
 
 
 def service(package, name, request, response, marks):
-    """Request and response."""
+    """Returns the request and response types."""
     kinds = []
     for kind, fields in [("Request", request), ("Response", response)]:
         fields = fields or {"structure_needs_at_least_one_member": uint8}
@@ -283,5 +283,5 @@ SERVICE_TYPES = {
     ),
 }
 SERVICES = {name: service(*kind, MARKS) for name, kind in SERVICE_TYPES.items()}
-# These have no name of the node in front.
+# Names of services that are not below the node's name.
 OPEN = ["octomap_binary", "octomap_full"]

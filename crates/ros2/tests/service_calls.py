@@ -1,4 +1,4 @@
-"""What the services of a node that has a map of peer.py do, whatever carries requests; the map is as before then."""
+"""Tests the services of a node with the map of peer.py over any transport. The map is unchanged afterwards."""
 
 import time
 
@@ -9,17 +9,17 @@ EVERYWHERE = Point(-1e3, -1e3, -1e3), Point(1e3, 1e3, 1e3)
 
 
 def last_of(take, is_wanted):
-    """The last message that came, once it is what is wanted; the node tells nothing at once."""
+    """Waits until the last received message is the wanted one, and returns it."""
     until, last = time.time() + 10, None
     while last is None or not is_wanted(last):
-        assert time.time() < until, f"not within 10 s what is wanted: {last}"
+        assert time.time() < until, f"not the wanted message within 10 s: {last}"
         time.sleep(0.1)
         [*_, last] = [last, *take()]
     return last
 
 
-def tells_of_the_map(diagnostics):
-    """Whether it is about a map with 30 scans on disk, without losses."""
+def is_complete(diagnostics):
+    """Returns whether the diagnostics report a map with 30 flushed scans, without losses."""
     [status] = diagnostics.status
     values = {value.key: value.value for value in status.values}
     is_whole = (status.level, values["scan_number"], values["unflushed_scans"]) == (0, "30", "0")
@@ -27,8 +27,8 @@ def tells_of_the_map(diagnostics):
     return is_whole and is_somewhere and float(values["flush_age_s"]) < 60
 
 
-def check(call, lie, published, diagnostics):
-    """call: a function for each service. lie: sends requests that lie. The others: messages that came since."""
+def check(call, send_malformed, published, diagnostics):
+    """call: function of each service; send_malformed: sends malformed requests; the others return new messages."""
 
     def whole(binary=True):
         response = call["octomap_in_box"](*EVERYWHERE, binary)
@@ -59,28 +59,28 @@ def check(call, lie, published, diagnostics):
         answer = call["cast_ray"](origin, wrong, 0.0, False)
         assert not answer.success and answer.message
 
-    # The name of a snapshot may be given again to the very same state, and to no other.
+    # The name of a snapshot can be reused for the same state, but not for another one.
     assert call["snapshot"]("before").success
     assert call["snapshot"]("before").success
     assert not call["snapshot"]("../out").success
     assert not call["revert"]("never").success
-    lie()
+    send_malformed()
 
     corner = Point(-1e3, -1e3, 0.5)
     call["clear_bbox"](corner, EVERYWHERE[1])
     below = {voxel: occupied for voxel, occupied in before.items() if voxel[2] < 5}
     assert whole() == below and 0 < len(below) < len(before)
     assert not call["snapshot"]("before").success
-    # A box that is none changes nothing.
+    # An inverted box changes nothing.
     call["clear_bbox"](EVERYWHERE[1], corner)
     assert whole() == below
     call["reset"]()
     assert whole() == {}
-    # What was cleared is not published any more, what came back is.
+    # Cleared voxels are not published any more; reverted ones are.
     last_of(published, lambda octree: len(octree.data) == 0)
     reverted = call["revert"]("before")
     assert reverted.success, reverted
     assert whole(False) == before_full
     last_of(published, lambda octree: len(octree.data) > 0)
-    last_of(diagnostics, tells_of_the_map)
+    last_of(diagnostics, is_complete)
     print(f"services: {len(before)} voxels, {len(below)} below, hit at {hit.distance:.2f} m")

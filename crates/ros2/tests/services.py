@@ -1,4 +1,4 @@
-"""Calls every service of a node that has a map of peer.py, as Cyclone DDS does; the map is as before then.
+"""Calls every service of a node with the map of peer.py over Cyclone DDS. The map is unchanged afterwards.
 
 services.py DOMAIN
 """
@@ -21,7 +21,7 @@ GUID = 0x1122334455667788
 
 
 class Service:
-    """A client of one service."""
+    """Client of one service."""
 
     def __init__(self, participant, name):
         self.name, self.number = name, 0
@@ -32,7 +32,7 @@ class Service:
         self.reader = DataReader(participant, Topic(participant, f"rr/{path}Reply", response), qos=qos)
         self.path = path
 
-    def is_there(self):
+    def is_matched(self):
         return self.writer.get_matched_subscriptions() and self.reader.get_matched_publications()
 
     def __call__(self, *arguments):
@@ -47,19 +47,19 @@ class Service:
         sys.exit(f"{self.name}: no answer")
 
 
-def lie(domain, service):
-    """A request for a text of 4 GB that is not there."""
+def send_malformed(domain, service):
+    """Sends requests that claim a string of 4 GB."""
     fields = [("guid", uint64), ("number", int64), ("length", uint32)]
     namespace = {"__module__": __name__, "__idl_typename__": service.request.__idl_typename__}
-    liar = make_dataclass("Liar", fields, bases=(IdlStruct,), namespace=namespace)
+    malformed = make_dataclass("Malformed", fields, bases=(IdlStruct,), namespace=namespace)
     participant = DomainParticipant(domain)
     qos = Qos(RELIABLE, VOLATILE, Policy.History.KeepLast(10))
-    writer = DataWriter(participant, Topic(participant, f"rq/{service.path}Request", liar), qos=qos)
+    writer = DataWriter(participant, Topic(participant, f"rq/{service.path}Request", malformed), qos=qos)
     until = time.time() + 5
     while not writer.get_matched_subscriptions() and time.time() < until:
         time.sleep(0.02)
     for number in range(20):
-        writer.write(liar(1, number, 2**32 - 1))
+        writer.write(malformed(1, number, 2**32 - 1))
     time.sleep(0.3)
 
 
@@ -71,11 +71,16 @@ def main():
     published = DataReader(participant, Topic(participant, "rt/octomap_binary", Octomap), qos=latched)
     diagnostics = DataReader(participant, Topic(participant, "rt/diagnostics", DiagnosticArray), qos=Qos(RELIABLE))
     until = time.time() + 20
-    while not all(service.is_there() for service in call.values()):
+    while not all(service.is_matched() for service in call.values()):
         if time.time() > until:
-            sys.exit(f"not there: {[name for name, service in call.items() if not service.is_there()]}")
+            sys.exit(f"missing: {[name for name, service in call.items() if not service.is_matched()]}")
         time.sleep(0.02)
-    check(call, lambda: lie(domain, call["snapshot"]), lambda: published.take(10), lambda: diagnostics.take(100))
+    check(
+        call,
+        lambda: send_malformed(domain, call["snapshot"]),
+        lambda: published.take(10),
+        lambda: diagnostics.take(100),
+    )
 
 
 main()

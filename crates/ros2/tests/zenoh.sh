@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
-# The node over Zenoh beside an independent peer (eclipse-zenoh from PyPI) and a router, over loopback: its map is that
-# of `voxtile build`, its outputs those of `voxtile export`; services, tokens, who comes late, who lies, another router.
+# Tests the node over Zenoh with an independent peer (eclipse-zenoh from PyPI) and a router, over loopback: maps,
+# outputs and services as in check.sh, and tokens, late subscribers, malformed messages and a restart of the router.
 #
-# zenoh.sh WORK_FOLDER   check.sh runs it, and names the programs in `python`, `voxtile`, `program`, and `outputs`
+# zenoh.sh WORK_FOLDER   run by check.sh, which exports `python`, `voxtile`, `program`, `outputs` and more variables
 set -euo pipefail
 cd "$(dirname "$0")"
 
@@ -34,7 +34,7 @@ end_router() {
     router=
 }
 
-# Starts the node with a map. What a hostile peer does in between takes it long, and no cloud is to miss its pose.
+# Starts the node with a map. The long wait for transforms covers the time that a hostile peer takes.
 start() {
     # shellcheck disable=SC2086
     "$program" -o "$1" --transport zenoh --zenoh-router tcp/127.0.0.1:$port --domain-id $domain --resolution 0.1 \
@@ -44,7 +44,7 @@ start() {
 
 end() {
     kill "-$1" $node
-    wait $node || fail "the node has failed"
+    wait $node || fail "the node failed"
     node=
 }
 
@@ -57,7 +57,7 @@ declare -A peak_kib
 for kind in friendly hostile; do
     map=$work/$kind
     if [ $kind = friendly ]; then
-        # The node comes first: it looks for its router until there is one.
+        # Start the node first: it must retry until there is a router.
         start "$map"
         start_router
     else
@@ -66,7 +66,7 @@ for kind in friendly hostile; do
     "$python" zenoh_peer.py $port $domain "$map.bag" 30 $kind >"$map.peer" &
     peer=$!
     if [ $kind = hostile ]; then
-        # It comes after the static transforms, and gets them.
+        # Start the node after the static transforms were sent: it must receive them.
         for _ in $(seq 200); do
             grep -q published "$map.peer" && break
             sleep 0.1
@@ -75,7 +75,7 @@ for kind in friendly hostile; do
     fi
     "$python" zenoh_outputs.py $port $domain "$map.outputs" 120 &
     listener=$!
-    wait $peer || fail "the peer has failed"
+    wait $peer || fail "the peer failed"
     peer=
     sleep 3
     kill $listener
@@ -87,33 +87,33 @@ for kind in friendly hostile; do
     grep -q ' 30 mapped' "$map.counters" || fail "not all clouds were mapped"
     "$voxtile" build "$map.bag" -o "$map.built" --resolution 0.1 --tile-size 10 --max-range 60 >/dev/null
     of_node=$("$voxtile" digest "$map") of_bag=$("$voxtile" digest "$map.built")
-    [ "$of_node" = "$of_bag" ] || fail "the map of the node is another one: $of_node, not $of_bag"
-    [ "$of_node" = "${of_friend:-$of_node}" ] || fail "$kind: another map: $of_node, not $of_friend"
+    [ "$of_node" = "$of_bag" ] || fail "the map of the node differs: $of_node, not $of_bag"
+    [ "$of_node" = "${of_friend:-$of_node}" ] || fail "$kind: the map differs: $of_node, not $of_friend"
     of_friend=$of_node
     "$voxtile" export "$map" -o "$map.csv" --what all >/dev/null
     "$voxtile" export "$map" -o "$map.pgm" --z-max $max_z >/dev/null
     compare $kind live
     if [ $kind = hostile ]; then
         grep -q ' 1 too large' "$map.counters" || fail "a cloud larger than the queue is not counted"
-        # The message of 17 MiB, the queue's 16 MiB, and what came with them.
+        # The limit covers the message of 17 MiB, the queue of 16 MiB and further messages.
         echo "zenoh: $((peak_kib[friendly] >> 10)) MiB of memory, $((peak_kib[hostile] >> 10)) with a hostile peer"
         [ ${peak_kib[hostile]} -lt $((peak_kib[friendly] + (64 << 10))) ] || fail "a hostile peer takes memory"
-        grep -q ' 0 malformed' "$map.counters" && fail "clouds that lie are not counted"
+        grep -q ' 0 malformed' "$map.counters" && fail "malformed clouds are not counted"
     else
-        # It tells who comes late; its router goes away and another one comes.
+        # The restarted node serves late subscribers. Then the router is replaced.
         start "$map"
         "$python" zenoh_outputs.py $port $domain "$map.outputs" 6 || fail "no outputs"
         compare $kind rest
         if grep -q '"count": [^1]' "$map.outputs"; then
-            fail "what did not change was published again"
+            fail "an unchanged message was published again"
         fi
         "$python" zenoh_services.py $port $domain || fail "services"
         timeout 100 "$python" zenoh_sdk.py $port $domain || fail "zenoh_ros2_sdk"
         end_router
         start_router
-        "$python" zenoh_services.py $port $domain again || fail "the node has lost its router"
+        "$python" zenoh_services.py $port $domain again || fail "the node did not reconnect to the router"
         end TERM
-        [ "$("$voxtile" digest "$map")" = "$of_node" ] || fail "starting again changes the map"
+        [ "$("$voxtile" digest "$map")" = "$of_node" ] || fail "a restart changes the map"
     fi
     end_router
     echo "zenoh, $kind: $of_node"

@@ -1,4 +1,4 @@
-"""A node of ROS 2 over Zenoh, written after the design of rmw_zenoh_cpp (its docs/design.md) and not after ours."""
+"""ROS 2 node over Zenoh, written from the design of rmw_zenoh_cpp (its docs/design.md), independent of the node."""
 
 import itertools
 import os
@@ -16,7 +16,7 @@ SESSIONS = []
 
 
 def run(main):
-    """Runs a program, and closes the sessions however it ends: their threads would keep the process."""
+    """Runs a program and always closes the sessions, whose threads would keep the process running."""
     try:
         main()
     finally:
@@ -34,7 +34,7 @@ def qos_text(reliable, latched, depth):
 
 
 class Graph:
-    """A session that knows others from a router, and one node in it."""
+    """Session that is connected to a router, with one node."""
 
     def __init__(self, port, domain, name="peer"):
         config = zenoh.Config()
@@ -56,7 +56,7 @@ class Graph:
         self.kept.append(self.session.liveliness().declare_token(token))
 
     def announce(self, end, topic, kind, qos, folder="msg"):
-        """Tells others of one end of a topic, and returns its key."""
+        """Announces an endpoint of a topic or service and returns its key."""
         typed = f"{dds_name(kind, folder)}/{HASHES[kind]}"
         mangled = topic.replace("/", "%")
         self.declare(f"{self.start()}/{next(self.entities)}/{end}/%/%/{self.name}/{mangled}/{typed}/{qos}")
@@ -66,7 +66,7 @@ class Graph:
         return struct.pack("<qqB", next(self.numbers), time.time_ns(), 16) + self.gid
 
     def publisher(self, topic, kind, reliable=True, latched=False, depth=10):
-        """A function that sends bytes of CDR."""
+        """Returns a function that publishes CDR bytes."""
         key = self.announce("MP", topic, kind, qos_text(reliable, latched, depth))
         if latched:
             options = {"heartbeat": None, "sporadic_heartbeat": 0.5}
@@ -78,13 +78,13 @@ class Graph:
                 publisher_detection=True,
             )
         else:
-            # A busy machine loses nothing of a test that counts.
+            # Block instead of dropping messages, because tests count them.
             publisher = self.session.declare_publisher(key, congestion_control=zenoh.CongestionControl.BLOCK)
         self.kept.append(publisher)
         return lambda cdr: publisher.put(cdr, attachment=self.attachment())
 
     def subscription(self, topic, kind, take, reliable=True, latched=False, depth=10):
-        """Gives the bytes of each sample to a function."""
+        """Calls a function with the bytes of each message."""
         key = self.announce("MS", topic, kind, qos_text(reliable, latched, depth))
         seen = {}
 
@@ -109,13 +109,13 @@ class Graph:
         self.kept.append(subscriber)
 
     def client(self, service, kind):
-        """A function that sends bytes of a request and returns those of the response."""
+        """Returns a function that sends the bytes of a request and returns those of the response, and the key."""
         key = self.announce("SC", service, kind, qos_text(True, False, 10), "srv")
 
         def call(cdr):
             attachment, replies = self.attachment(), []
             until = time.time() + ANSWER_S
-            # Tokens come before the way to the service is known; then Zenoh answers at once, with nothing.
+            # Tokens arrive before the route to the service is known. Until then Zenoh returns no replies at once.
             while not replies and time.time() < until:
                 replies = list(self.session.get(key, payload=cdr, attachment=attachment, timeout=ANSWER_S))
             if len(replies) != 1 or replies[0].ok is None:
@@ -127,18 +127,18 @@ class Graph:
         return call, key
 
     def tokens(self, pattern):
-        """Tokens of others that are there now, as lists of their parts."""
+        """Returns the current tokens of other sessions, split into their parts."""
         replies = self.session.liveliness().get(f"@ros2_lv/{self.domain}/{pattern}", timeout=5.0)
         found = [str(reply.ok.key_expr).split("/") for reply in replies if reply.ok is not None]
         return [parts for parts in found if parts[2] != str(self.session.info.zid())]
 
     def wait_for(self, end, names, seconds=20):
-        """Waits for ends of these topics or services."""
+        """Waits for the endpoints of these topics or services."""
         until = time.time() + seconds
         while True:
-            there = {parts[9].replace("%", "/") for parts in self.tokens(f"*/*/*/{end}/**")}
-            if set(names) <= there:
+            found = {parts[9].replace("%", "/") for parts in self.tokens(f"*/*/*/{end}/**")}
+            if set(names) <= found:
                 return
             if time.time() > until:
-                sys.exit(f"not there: {sorted(set(names) - there)}")
+                sys.exit(f"missing: {sorted(set(names) - found)}")
             time.sleep(0.1)

@@ -1,7 +1,7 @@
-"""What the node publishes over Zenoh, as an independent peer gets it; outputs.py compares it.
+"""Receives the node's outputs over Zenoh with an independent peer; outputs.py compares them.
 
-zenoh_outputs.py PORT DOMAIN FILE SECONDS   writes the last message of each topic, and how many there were, after so
-                                            many seconds or at SIGTERM
+zenoh_outputs.py PORT DOMAIN FILE SECONDS   writes the last message and the number of messages of each topic after
+                                            SECONDS or at SIGTERM
 """
 
 import functools

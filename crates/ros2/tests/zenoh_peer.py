@@ -2,8 +2,8 @@
 
 zenoh_peer.py PORT DOMAIN BAG CLOUDS friendly|hostile
 
-hostile: beside them come clouds that lie, bytes that are no messages, more than the queue takes, samples without
-attachment, wrong types, and thousands of tokens.
+hostile: also sends malformed clouds, random bytes, more than the queue holds, messages without attachment, wrong types
+and thousands of tokens.
 """
 
 import os
@@ -18,7 +18,7 @@ from zenoh_services import client
 
 
 def hostilities(graph, key):
-    """What no node sends."""
+    """Sends messages and tokens that no correct node sends."""
     garbage = [b"", b"\0", b"\0\1\0\0", b"\0\1\0\0" + b"\xff" * 64, os.urandom(5000), b"\0\7\0\0" + bytes(100)]
     for one in garbage:
         graph.session.put(key, one)
@@ -52,18 +52,18 @@ def main():
     for number, (name, message) in enumerate(coming):
         if is_hostile and number == 20:
             key = graph.announce("MP", "/cloud_in", "sensor_msgs/PointCloud2", "2::,5:,:,:,,")
-            # What waits is taken before: these push out what is older.
+            # Let the queued messages be taken first: the following ones displace older ones.
             time.sleep(0.3)
             hostilities(graph, key)
-            # The router drops messages for a node that is busy for seconds: this call returns when all was taken.
+            # The router drops messages for a node that is busy for seconds. This call returns after all were taken.
             get_octomap, _ = client(graph, "octomap_binary")
             get_octomap()
         if is_hostile and name == "/cloud_in" and number > 20:
-            liar = cloud(0, 1)
-            liar.header.stamp = message.header.stamp
-            liar.height = liar.width = liar.row_step = 2**32 - 1
-            publishers[name](bytes(liar.serialize()))
-            publishers["/tf"](bytes(liar.serialize()))
+            malformed = cloud(0, 1)
+            malformed.header.stamp = message.header.stamp
+            malformed.height = malformed.width = malformed.row_step = 2**32 - 1
+            publishers[name](bytes(malformed.serialize()))
+            publishers["/tf"](bytes(malformed.serialize()))
             stamp = message.header.stamp
             wrong = loops((stamp.sec - START_S) * 10**9 + stamp.nanosec)
             publishers["/tf"](bytes(wrong.serialize()))

@@ -1,4 +1,4 @@
-"""A router of Zenoh on a port of the loopback interface, until it is killed, as `ros2 run rmw_zenoh_cpp rmw_zenohd` is.
+"""Zenoh router on a loopback port until it is killed, like `ros2 run rmw_zenoh_cpp rmw_zenohd`.
 
 zenoh_router.py PORT
 """

@@ -1,6 +1,6 @@
-"""The node as zenoh_ros2_sdk sees it, which others wrote: its topics, and two services with hashes that it computes.
+"""Tests the node with the independent zenoh_ros2_sdk: its topics, and two services whose hashes the SDK computes.
 
-zenoh_sdk.py PORT DOMAIN   without the package it says so and passes
+zenoh_sdk.py PORT DOMAIN   passes with a message if the package is missing
 """
 
 import os
@@ -19,12 +19,12 @@ except ImportError as error:
 OUTCOME = "bool success\nstring message\n"
 
 
-def asked_again(question, is_whole, seconds=20):
-    """The answer once it is whole: a session that was just opened may not know of others' tokens and services yet."""
+def retried(query, is_complete, seconds=20):
+    """Retries until the answer is complete: a new session may not know the tokens and services of others yet."""
     until = time.time() + seconds
     while True:
-        answer = question()
-        if is_whole(answer) or time.time() > until:
+        answer = query()
+        if is_complete(answer) or time.time() > until:
             return answer
         time.sleep(0.1)
 
@@ -39,20 +39,20 @@ def main():
         return response is not None
 
     save = client("/voxtile_ros2/save", "std_srvs/srv/Trigger", "# nothing\n")
-    saved = asked_again(save.call, is_answer)
+    saved = retried(save.call, is_answer)
     assert saved is not None and saved.success and saved.message.startswith("durable"), saved
     revert = client("/voxtile_ros2/revert", "voxtile_msgs/srv/Snapshot", "string name\n")
-    named = asked_again(lambda: revert.call(name="of nobody"), is_answer)
+    named = retried(lambda: revert.call(name="unknown"), is_answer)
     assert named is not None and not named.success and named.message, named
     wanted = {"/octomap_binary": ["octomap_msgs/msg/Octomap"], "/cloud_in": ["sensor_msgs/msg/PointCloud2"]}
-    topics = asked_again(
+    topics = retried(
         lambda: dict(get_topic_names_and_types(domain, router_port=port, timeout=5.0)),
         lambda topics: wanted.keys() <= topics.keys(),
     )
     assert wanted.items() <= topics.items(), topics
     session = ZenohSession.get_instance("127.0.0.1", port)
     token = f"@ros2_lv/{domain}/*/*/*/MP/*/*/voxtile_ros2/%projected_map/**"
-    replies = asked_again(lambda: list(session.liveliness.get(token, timeout=5.0)), bool)
+    replies = retried(lambda: list(session.liveliness.get(token, timeout=5.0)), bool)
     [qos] = [QosProfile.decode(str(reply.ok.key_expr).split("/")[-1]) for reply in replies]
     wanted = QosReliability.RELIABLE, QosDurability.TRANSIENT_LOCAL, 1
     assert (qos.reliability, qos.durability, qos.history_depth) == wanted, qos
@@ -65,6 +65,6 @@ try:
 except BaseException as error:
     print(f"zenoh_sdk.py: {error!r}", file=sys.stderr)
     status = 1
-# Its sessions keep threads.
+# Exit at once, because its sessions keep threads.
 sys.stdout.flush()
 os._exit(status)

@@ -1,7 +1,7 @@
-"""Calls every service of a node over Zenoh, and looks at its tokens; the map is as before then.
+"""Calls every service of a node over Zenoh and checks its tokens. The map is unchanged afterwards.
 
-zenoh_services.py PORT DOMAIN        all of them, and what a client does that lies
-zenoh_services.py PORT DOMAIN again  one of them only: the router is a new one
+zenoh_services.py PORT DOMAIN        calls all services, and sends malformed requests
+zenoh_services.py PORT DOMAIN again  calls one service after a restart of the router
 """
 
 import struct
@@ -28,7 +28,7 @@ PUBLISHED = {
 
 
 class Topic:
-    """The messages of a topic that came since it was last asked."""
+    """Messages of a topic since the last call."""
 
     def __init__(self, graph, topic, kind, dataclass, **qos):
         self.messages, self.lock = [], threading.Lock()
@@ -39,7 +39,7 @@ class Topic:
             self.messages.append(message)
 
     def first(self, seconds=15):
-        """The messages, once there are any."""
+        """Waits for messages and returns them."""
         until = time.time() + seconds
         while not self.messages and time.time() < until:
             time.sleep(0.05)
@@ -47,8 +47,8 @@ class Topic:
 
     def __call__(self):
         with self.lock:
-            came, self.messages = self.messages, []
-        return came
+            received, self.messages = self.messages, []
+        return received
 
 
 def full_name(name):
@@ -56,7 +56,7 @@ def full_name(name):
 
 
 def client(graph, name):
-    """A function of the fields of a request."""
+    """Returns a function of the fields of a request, and the key of the service."""
     kind = SERVICE_TYPES[name]
     request, response = service(*kind, {})
     call, key = graph.client(full_name(name), f"{kind[0]}/{kind[1]}")
@@ -64,7 +64,7 @@ def client(graph, name):
 
 
 def check_tokens(graph):
-    """The graph as `ros2 node info` shows it."""
+    """Checks the graph as `ros2 node info` shows it."""
     [node] = [parts for parts in graph.tokens("*/*/*/NN/**") if parts[8] == "voxtile_ros2"]
     assert node[5:] == ["NN", "%", "%", "voxtile_ros2"] and node[3] == node[4] == "0", node
     ends = {}
@@ -85,7 +85,7 @@ def check_tokens(graph):
 
 
 def eventually(check, seconds=20):
-    """The graph spreads: what is not so at first has to be so at last."""
+    """Retries a check, because the graph spreads with a delay."""
     until = time.time() + seconds
     while True:
         try:
@@ -96,17 +96,18 @@ def eventually(check, seconds=20):
         time.sleep(0.2)
 
 
-def lie(graph, key):
-    """Requests of which nothing is right; each is answered with what is wrong, or not at all."""
-    liar = b"\0\1\0\0" + struct.pack("<I", 2**32 - 1)
+def send_malformed(graph, key):
+    """Sends malformed requests. Each gets an error or no response."""
+    malformed = b"\0\1\0\0" + struct.pack("<I", 2**32 - 1)
     good = graph.attachment()
-    wrong = [(liar, good), (b"", good), (None, good), (liar, None), (liar, b"\xff" * 33), (b"\0\7\0\0", good)]
+    wrong = [(malformed, good), (b"", good), (None, good), (malformed, None), (malformed, b"\xff" * 33)]
+    wrong.append((b"\0\7\0\0", good))
     for payload, attachment in wrong:
         replies = list(graph.session.get(key, payload=payload, attachment=attachment, timeout=5.0))
-        assert all(reply.ok is None for reply in replies), "it was answered"
+        assert all(reply.ok is None for reply in replies), "a malformed request was answered"
     assert not list(graph.session.get(key, payload=bytes(3 << 20), attachment=good, timeout=5.0))
-    # More than can wait, at once.
-    pending = [graph.session.get(key, payload=liar, attachment=good, timeout=5.0) for _ in range(300)]
+    # Send more requests at once than the queue holds.
+    pending = [graph.session.get(key, payload=malformed, attachment=good, timeout=5.0) for _ in range(300)]
     for replies in pending:
         assert all(reply.ok is None for reply in replies)
 
@@ -117,21 +118,21 @@ def main():
     graph.wait_for("SS", map(full_name, SERVICE_TYPES))
     calls = {name: client(graph, name) for name in SERVICE_TYPES}
     if sys.argv[3:] == ["again"]:
-        print("zenoh: after another router came:", calls["save"][0]().message)
+        print("zenoh: after a restart of the router:", calls["save"][0]().message)
         return
     eventually(lambda: check_tokens(graph))
     octomap = "octomap_msgs/Octomap"
     published = Topic(graph, "/octomap_binary", octomap, Octomap, latched=True, depth=1)
     diagnostics = Topic(graph, "/diagnostics", "diagnostic_msgs/DiagnosticArray", DiagnosticArray)
     [first] = published.first()
-    # Who comes late gets the last one, which is the same, and once.
+    # A late subscriber gets the last message once.
     late = Topic(Graph(port, domain, "late"), "/octomap_binary", octomap, Octomap, latched=True, depth=1)
     [last] = late.first()
     assert bytes(first.serialize()) == bytes(last.serialize())
     time.sleep(1.0)
-    assert not published() and not late(), "it was sent again"
+    assert not published() and not late(), "an unchanged message was sent again"
     functions = {name: call for name, (call, _) in calls.items()}
-    check(functions, lambda: lie(graph, calls["snapshot"][1]), published, diagnostics)
+    check(functions, lambda: send_malformed(graph, calls["snapshot"][1]), published, diagnostics)
     outside = calls["octomap_in_box"][0](Point(0.0, 0.0, 0.0), Point(0.0, 0.0, 0.0), True)
     assert not outside.success and "not below" in outside.message
 

@@ -6,24 +6,23 @@ use voxtile::space::Grid;
 use voxtile::{MapConfig, MapReader, MemoryLimit, OutOfCoreTileMapper};
 use voxtile_share::{VoxelSet, read_layer, write_layer};
 
-/// Where the layers of a map lie: beside it.
+/// Returns the folder of a map's layers: `MAP.layers`, next to the map.
 pub fn layers_folder(map: &Path) -> PathBuf {
     let mut name = map.file_name().unwrap_or_default().to_os_string();
     name.push(".layers");
     map.with_file_name(name)
 }
 
-/// Reads a robot's layer.
 pub fn load_layer(path: &Path, max_voxels: u64) -> anyhow::Result<VoxelSet> {
     let file = File::open(path).with_context(|| format!("{}: cannot open the layer", path.display()))?;
     Ok(read_layer(&mut BufReader::new(file), max_voxels).map_err(|error| error.in_input(path))?)
 }
 
-/// Writes a robot's layer: whole, or not at all.
+/// Writes a robot's layer atomically.
 pub fn save_layer(path: &Path, layer: &mut VoxelSet) -> anyhow::Result<()> {
     let next = path.with_extension("layer.next");
     let write = || -> io::Result<()> {
-        // Of a run that was killed, or a link that somebody put there: not written through.
+        // Remove a leftover file of an interrupted run. A link with this name must not be followed.
         match fs::remove_file(&next) {
             Err(error) if error.kind() != io::ErrorKind::NotFound => return Err(error),
             _ => {}
@@ -41,7 +40,7 @@ pub fn save_layer(path: &Path, layer: &mut VoxelSet) -> anyhow::Result<()> {
         .with_context(|| format!("{}: cannot write the layer", path.display()))
 }
 
-/// Moves a layer that cannot be used to a name that is free: `NAME.layer.aside-1` and so on.
+/// Renames an unusable layer to a free name: `NAME.layer.aside-1`, `NAME.layer.aside-2` ...
 pub fn set_aside(path: &Path) -> io::Result<PathBuf> {
     for number in 1..=1000 {
         let aside = path.with_extension(format!("layer.aside-{number}"));
@@ -54,10 +53,10 @@ pub fn set_aside(path: &Path) -> io::Result<PathBuf> {
             Err(error) => return Err(error),
         }
     }
-    Err(io::Error::other("a thousand layers lie aside already"))
+    Err(io::Error::other("1000 files NAME.layer.aside-N exist already; remove some"))
 }
 
-/// Opens a map to write to, in about so much memory, or makes one with the voxels of a grid.
+/// Opens a map for writing with about `memory_bytes`, or creates one with the voxel and tile size of `grid`.
 pub fn open_map(folder: &Path, grid: &Grid, memory_bytes: usize) -> anyhow::Result<OutOfCoreTileMapper> {
     let limit = |config: MapConfig| {
         let least = MemoryLimit::min_bytes(&config.grid);
@@ -73,7 +72,6 @@ pub fn open_map(folder: &Path, grid: &Grid, memory_bytes: usize) -> anyhow::Resu
     }
 }
 
-/// The lengths of a grid, as a person reads them.
 pub fn lengths(grid: &Grid) -> String {
     format!("voxels of {} m and tiles of {} m", grid.resolution_m(), grid.tile_size_m())
 }

@@ -2,17 +2,17 @@ use std::collections::{BTreeMap, VecDeque};
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-/// Bytes that came under a key.
+/// Payload received under a key.
 pub struct Message {
     pub key: String,
     pub bytes: Vec<u8>,
 }
 
-/// Messages that wait to be taken in, fair between robots: next comes that of the robot that has taken least time so
-/// far, and where there is no room, the robot with most bytes waiting loses its oldest message. Catch-up mends what is
-/// lost.
+/// Queue of received messages, fair between robots. [`next`](Inbox::next) serves the robot with the least processing
+/// time. If the queue exceeds `MAX_BYTES`, the robot with the most queued bytes loses its oldest message; catch-up
+/// repairs the loss.
 ///
-/// Robots that nobody has admitted wait together, as one.
+/// Robots that are not admitted share one queue.
 #[derive(Default)]
 pub struct Inbox {
     state: Mutex<State>,
@@ -22,9 +22,9 @@ pub struct Inbox {
 #[derive(Default)]
 struct State {
     robots: BTreeMap<String, Queue>,
-    strangers: Queue,
+    unadmitted: Queue,
     bytes: usize,
-    /// Of who came last.
+    /// Processing time of the queue that was served last.
     spent: Duration,
 }
 
@@ -32,17 +32,18 @@ struct State {
 struct Queue {
     messages: VecDeque<Message>,
     bytes: usize,
-    /// Time that its messages took; no less than that of who came last, so that nobody saves time up.
+    /// Processing time of its messages. An empty queue that gets a message is raised to the queue served last, so that
+    /// idle robots accumulate no credit.
     spent: Duration,
 }
 
-/// Bytes of messages that wait.
+/// Maximum size of all queued messages.
 const MAX_BYTES: usize = 4 << 20;
-/// What a message takes beside its bytes.
+/// Overhead of a message in addition to its bytes.
 const MESSAGE: usize = 128;
 
 impl Inbox {
-    /// Puts a message in, at the cost of who has most.
+    /// Queues a message. Drops messages of the longest queue until all fit.
     pub fn put(&self, robot: &str, message: Message) {
         let mut state = self.lock();
         let spent = state.spent;
@@ -63,7 +64,7 @@ impl Inbox {
         self.has_message.notify_one();
     }
 
-    /// The next message, if there is one within a time.
+    /// Returns the next message, or `None` after `wait`.
     pub fn next(&self, wait: Duration) -> Option<Message> {
         let is_empty = |state: &mut State| state.bytes == 0;
         let (mut state, _) = self
@@ -78,7 +79,7 @@ impl Inbox {
         Some(message)
     }
 
-    /// Has a robot's messages wait by themselves, or again with those of strangers.
+    /// Gives a robot its own queue, or removes it with its messages.
     pub fn admit(&self, robot: &str, is_admitted: bool) {
         let mut state = self.lock();
         if is_admitted {
@@ -90,26 +91,26 @@ impl Inbox {
         }
     }
 
-    /// Counts the time since a message of a robot was taken.
+    /// Adds the time since `since` to the robot's processing time.
     pub fn has_spent(&self, robot: &str, since: Instant) {
         self.lock().queue(robot).spent += since.elapsed();
     }
 
     fn lock(&self) -> MutexGuard<'_, State> {
-        // Nothing here can panic half way.
+        // No code under this lock can panic with the state half changed.
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
 impl State {
     fn queues(&mut self) -> impl Iterator<Item = &mut Queue> {
-        self.robots.values_mut().chain([&mut self.strangers])
+        self.robots.values_mut().chain([&mut self.unadmitted])
     }
 
     fn queue(&mut self, robot: &str) -> &mut Queue {
         match self.robots.get_mut(robot) {
             Some(queue) => queue,
-            None => &mut self.strangers,
+            None => &mut self.unadmitted,
         }
     }
 }
@@ -137,37 +138,37 @@ mod tests {
     }
 
     #[test]
-    fn a_flood_of_one_robot_loses_its_own_messages_alone() {
+    fn a_flooding_robot_loses_only_its_own_messages() {
         let inbox = Inbox::default();
         ["a", "flood"].iter().for_each(|robot| inbox.admit(robot, true));
         (0..10).for_each(|_| inbox.put("a", message("a", 1000)));
         (0..1000).for_each(|_| inbox.put("flood", message("flood", 60_000)));
-        (0..1000).for_each(|_| inbox.put("stranger", message("stranger", 60_000)));
+        (0..1000).for_each(|_| inbox.put("unknown", message("unknown", 60_000)));
         assert!(inbox.lock().bytes <= MAX_BYTES);
-        let came: Vec<String> =
+        let received: Vec<String> =
             std::iter::from_fn(|| inbox.next(Duration::ZERO)).map(|message| message.key).collect();
-        assert_eq!(came.iter().filter(|robot| *robot == "a").count(), 10);
-        assert!(came.iter().filter(|robot| *robot == "flood").count() > 20);
-        assert!(came.iter().filter(|robot| *robot == "stranger").count() > 20);
+        assert_eq!(received.iter().filter(|robot| *robot == "a").count(), 10);
+        assert!(received.iter().filter(|robot| *robot == "flood").count() > 20);
+        assert!(received.iter().filter(|robot| *robot == "unknown").count() > 20);
         assert_eq!(inbox.lock().bytes, 0);
     }
 
     #[test]
-    fn who_takes_long_comes_less_often() {
+    fn slow_robots_are_served_less_often() {
         let inbox = Inbox::default();
         ["quick", "slow"].iter().for_each(|robot| inbox.admit(robot, true));
         for _ in 0..100 {
             inbox.put("quick", message("quick", 10));
             inbox.put("slow", message("slow", 10));
         }
-        let mut came = BTreeMap::<String, usize>::new();
+        let mut received = BTreeMap::<String, usize>::new();
         for _ in 0..101 {
             let robot = inbox.next(Duration::ZERO).unwrap().key;
             let took = Duration::from_millis(if robot == "slow" { 1000 } else { 10 });
             inbox.lock().queue(&robot).spent += took;
-            *came.entry(robot).or_default() += 1;
+            *received.entry(robot).or_default() += 1;
         }
-        assert!(came["slow"] <= 2 && came["quick"] >= 99, "{came:?}");
+        assert!(received["slow"] <= 2 && received["quick"] >= 99, "{received:?}");
         inbox.admit("slow", false);
         assert!(inbox.next(Duration::ZERO).is_none() || inbox.lock().bytes == 0);
     }

@@ -7,18 +7,18 @@ use std::path::{Path, PathBuf};
 use voxtile::space::Grid;
 use voxtile_share::{VoxelSet, read_layer_within};
 
-/// The file of a robot's layer.
+/// File of a robot's layer.
 pub struct LayerStore {
     path: PathBuf,
-    /// Whether there is a file that could neither be read nor moved away: it is not written over.
+    /// Whether the file could neither be read nor renamed. It is then never overwritten.
     is_kept: bool,
-    /// The digest of what is in the file.
+    /// Digest of the content of the file.
     saved: Option<String>,
 }
 
-/// What a layer may take.
+/// Limits of a loaded layer.
 #[derive(Clone, Copy)]
-pub struct LayerRoom {
+pub struct LayerLimits {
     pub grid: Option<Grid>,
     pub max_voxels: u64,
     pub max_bytes: usize,
@@ -29,43 +29,51 @@ impl LayerStore {
         Self { path: folder.join(format!("{robot}.layer")), is_kept: false, saved: None }
     }
 
-    /// The layer as it was last saved. A file that holds none is moved aside, so that a person can look at it.
-    pub fn load(&mut self, robot: &RobotName, room: LayerRoom, reports: &mut Reports) -> Option<VoxelSet> {
-        let reason = match self.read(room) {
+    /// Returns the last saved layer. Renames an unreadable file, so that a person can examine it.
+    pub fn load(
+        &mut self,
+        robot: &RobotName,
+        limits: LayerLimits,
+        reports: &mut Reports,
+    ) -> Option<VoxelSet> {
+        let reason = match self.read(limits) {
             Ok(layer) => return layer,
             Err(error) => format!("{error:#}"),
         };
         match set_aside(&self.path) {
-            Ok(aside) => reports.tell(robot, Kind::Read, || {
-                format!("{reason}; it is kept as {} and the robot is asked anew", aside.display())
+            Ok(aside) => reports.report(robot, Kind::Read, || {
+                format!(
+                    "{reason}; file kept as {}, the layer is requested from the robot again",
+                    aside.display()
+                )
             }),
             Err(error) => {
                 self.is_kept = true;
-                reports.tell(robot, Kind::Read, || {
-                    format!("{reason}; it cannot be moved aside ({error}), so nothing of this robot is saved")
+                reports.report(robot, Kind::Read, || {
+                    format!("{reason}; cannot rename the file ({error}): this robot's layer is not saved")
                 });
             }
         }
         None
     }
 
-    fn read(&mut self, room: LayerRoom) -> anyhow::Result<Option<VoxelSet>> {
+    fn read(&mut self, limits: LayerLimits) -> anyhow::Result<Option<VoxelSet>> {
         let file = match File::open(&self.path) {
             Ok(file) => file,
             Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(None),
             Err(error) => anyhow::bail!("{}: cannot open the layer: {error}", self.path.display()),
         };
-        let mut layer = read_layer_within(&mut BufReader::new(file), room.max_voxels, room.max_bytes)
+        let mut layer = read_layer_within(&mut BufReader::new(file), limits.max_voxels, limits.max_bytes)
             .map_err(|error| error.in_input(&self.path))?;
-        if let Some(grid) = room.grid.filter(|grid| grid != layer.grid()) {
+        if let Some(grid) = limits.grid.filter(|grid| grid != layer.grid()) {
             let (theirs, ours) = (crate::files::lengths(layer.grid()), crate::files::lengths(&grid));
-            anyhow::bail!("{}: a layer of {theirs}, but the map has {ours}", self.path.display());
+            anyhow::bail!("{}: the layer has {theirs}, but the map has {ours}", self.path.display());
         }
         self.saved = Some(layer.digest().to_string());
         Ok(Some(layer))
     }
 
-    /// Saves the layer, if it changed. A failure is told, and tried again next time.
+    /// Saves the layer if it changed. A failure is reported, and the next call retries.
     pub fn save(&mut self, robot: &RobotName, layer: &mut VoxelSet, reports: &mut Reports) {
         if self.is_kept {
             return;
@@ -79,11 +87,11 @@ impl LayerStore {
                 self.saved = Some(digest);
                 reports.is_over(robot, Kind::Save);
             }
-            Err(error) => reports.tell(robot, Kind::Save, || format!("{error:#}; it is tried again")),
+            Err(error) => reports.report(robot, Kind::Save, || format!("{error:#}; will retry")),
         }
     }
 
-    /// Whether a layer with this digest is in the file.
+    /// Returns whether the file holds a layer with this digest.
     pub fn has(&self, layer: &mut VoxelSet) -> bool {
         self.saved.as_ref() == Some(&layer.digest().to_string())
     }

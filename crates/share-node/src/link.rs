@@ -7,17 +7,17 @@ use std::time::Duration;
 use zenoh::qos::CongestionControl;
 use zenoh::{Config, Session, Wait};
 
-/// A connection to other robots: bytes under keys.
+/// Connection to other robots: payloads published under keys.
 pub struct Link {
     session: Session,
     inbox: Arc<Inbox>,
-    /// Kept alive, or nothing comes any more.
+    /// Must be kept alive: a dropped subscriber receives nothing.
     subscribers: Vec<zenoh::pubsub::Subscriber<()>>,
 }
 
-/// Larger messages are none of ours.
+/// Larger messages are ignored: voxtile sends none.
 const MAX_BYTES: usize = 64 << 10;
-/// And so are longer keys.
+/// Longer keys are ignored: voxtile uses none.
 const MAX_KEY: usize = 128;
 
 impl Link {
@@ -37,26 +37,26 @@ impl Link {
         let mut set = |key: &str, value: String| {
             config.insert_json5(key, &value).map_err(|error| anyhow!("{key}: {error}"))
         };
-        // Zenoh's own defaults would listen on every interface and scout by multicast; a file has to ask for that.
-        if !file.says("mode") {
+        // Unlike Zenoh's defaults, do not listen on every interface or scout by multicast unless the file sets it.
+        if !file.sets("mode") {
             set("mode", "\"peer\"".into())?;
         }
-        if !file.says("transport/link/rx/max_message_size") {
-            // Zenoh's own is a gigabyte, put together from fragments before anybody looks at it.
+        if !file.sets("transport/link/rx/max_message_size") {
+            // Zenoh's default is 1 GB, reassembled from fragments before our callback can check the size.
             set("transport/link/rx/max_message_size", (2 * MAX_BYTES).to_string())?;
         }
-        if args.scout || !file.says("scouting/multicast/enabled") {
+        if args.scout || !file.sets("scouting/multicast/enabled") {
             set("scouting/multicast/enabled", args.scout.to_string())?;
         }
-        let is_silent = !file.says("listen/endpoints") && !file.says("connect/endpoints");
-        if !args.listen.is_empty() || is_silent {
+        let has_no_endpoint = !file.sets("listen/endpoints") && !file.sets("connect/endpoints");
+        if !args.listen.is_empty() || has_no_endpoint {
             set("listen/endpoints", serde_json::to_string(&listen)?)?;
-        } else if !file.says("listen/endpoints") {
+        } else if !file.sets("listen/endpoints") {
             set("listen/endpoints", "[]".into())?;
         }
-        if !args.connect.is_empty() || is_silent {
+        if !args.connect.is_empty() || has_no_endpoint {
             set("connect/endpoints", serde_json::to_string(&connect)?)?;
-            // Whoever is not there yet is tried again and again.
+            // Retry unreachable endpoints without a time limit.
             set("connect/timeout_ms", "-1".into())?;
             set("connect/exit_on_failure", "false".into())?;
         }
@@ -65,7 +65,7 @@ impl Link {
         Ok(Self { session, inbox: Arc::default(), subscribers: Vec::new() })
     }
 
-    /// Listens to all keys of a form.
+    /// Subscribes to all keys that match `keys`.
     pub fn subscribe(&mut self, keys: &str) -> anyhow::Result<()> {
         let inbox = self.inbox.clone();
         let take = move |sample: zenoh::sample::Sample| {
@@ -82,25 +82,24 @@ impl Link {
         Ok(())
     }
 
-    /// Sends, or drops where the network does not take it: catch-up mends that, and nobody waits.
+    /// Sends a message, or drops it if the network is congested. Never blocks; catch-up repairs the loss.
     pub fn send(&self, key: &str, bytes: Vec<u8>) -> anyhow::Result<()> {
         let put = self.session.put(key, bytes).congestion_control(CongestionControl::Drop).wait();
         put.map_err(|error| anyhow!("{error}")).with_context(|| format!("cannot send to {key}"))
     }
 
-    /// The next message, if one comes within a time.
+    /// Returns the next message, or `None` after `wait`.
     pub fn next(&self, wait: Duration) -> Option<Message> {
         self.inbox.next(wait)
     }
 
-    /// Where messages wait.
     pub fn inbox(&self) -> &Inbox {
         &self.inbox
     }
 
     pub fn close(self) {
         drop(self.subscribers);
-        // There is nothing to be done about a network that does not close.
+        // Ignore a failure to close the session.
         let _ = self.session.close().wait();
     }
 }
@@ -112,22 +111,22 @@ fn or_default(endpoints: &[String], others: &[String]) -> Vec<String> {
     }
 }
 
-/// Packets to all.
+/// Returns the key of packets to all receivers.
 pub fn packets_key(robot: &str) -> String {
     format!("voxtile/{robot}/packets")
 }
 
-/// Answers to one receiver, by its number.
+/// Returns the key of answers to one receiver.
 pub fn answers_key(robot: &str, receiver: u64) -> String {
     format!("voxtile/{robot}/answers/{receiver:016x}")
 }
 
-/// What a receiver asks.
+/// Returns the key of a receiver's requests.
 pub fn asks_key(robot: &str, receiver: u64) -> String {
     format!("voxtile/{robot}/asks/{receiver:016x}")
 }
 
-/// The robot, the kind and the receiver of a key.
+/// Splits a key into robot, kind and receiver.
 pub fn parse_key(key: &str) -> Option<(&str, &str, Option<u64>)> {
     let mut parts = key.split('/');
     let (_, robot, kind) = (parts.next()?, parts.next()?, parts.next()?);

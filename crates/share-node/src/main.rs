@@ -1,6 +1,6 @@
-//! The command `voxtile-share`, which `voxtile share` runs: sets of occupied voxels over Zenoh.
+//! Binary of `voxtile share`: exchanges sets of occupied voxels over Zenoh.
 //!
-//! All that is clever is in [`voxtile_share`]; here are the transport, the clock and the files.
+//! The protocol is in [`voxtile_share`]. This crate adds the transport, the clock and the files.
 
 mod args;
 mod files;
@@ -28,9 +28,9 @@ fn main() -> ExitCode {
     match run(&args) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            output::tell(format_args!("{error:#}"));
+            output::report(format_args!("{error:#}"));
             if args.json {
-                // There is nobody to tell that it is refused.
+                // Ignore a failure, because standard output may be closed.
                 let _ = json::print(&json::failure(&error));
             }
             ExitCode::from(if error.is::<voxtile::Error>() { 2 } else { 1 })
@@ -49,12 +49,12 @@ fn run(args: &Args) -> anyhow::Result<()> {
 }
 
 fn print_man_page() -> anyhow::Result<()> {
-    // Found as `man voxtile-share`, like the pages of the other commands.
+    // The page is found by `man voxtile-share`, like the pages of the other commands.
     let command = Args::command().name("voxtile-share");
     Ok(clap_mangen::Man::new(command).render(&mut std::io::stdout().lock())?)
 }
 
-/// Set by the first Ctrl-C or SIGTERM; a second one ends the process at once.
+/// Returns a flag that the first Ctrl-C or SIGTERM sets. A second signal ends the process at once.
 fn stop_signal() -> anyhow::Result<Arc<AtomicBool>> {
     let stop = Arc::new(AtomicBool::new(false));
     for signal in [signal_hook::consts::SIGINT, signal_hook::consts::SIGTERM] {

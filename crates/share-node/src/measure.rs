@@ -12,14 +12,14 @@ use voxtile_share::codec::{CONTEXTS, Packet, count_contexts};
 use voxtile_share::{MapWatch, Receiver, ReceiverConfig, Sender};
 
 const STEP: Duration = Duration::from_millis(50);
-/// A run that is not over by then after its last scan is not going to be.
-const PATIENCE: Duration = Duration::from_secs(600);
-/// What a link without a way back gets after the last scan.
+/// Time limit of a run after the last scan.
+const TIMEOUT: Duration = Duration::from_secs(600);
+/// Run time after the last scan without catch-up. The first scan is sent after twice this time.
 const REST: Duration = Duration::from_secs(5);
-/// Every packet takes up to so long.
+/// Maximum delay of a packet.
 const DELAY: Duration = Duration::from_millis(40);
 
-/// Sends scans over a simulated link, and says what that took.
+/// Sends scans over a simulated link and prints the bytes of each kind.
 pub fn run(args: &Args, scans: &[PathBuf]) -> anyhow::Result<()> {
     let mut counts = vec![[0; 2]; CONTEXTS];
     let mut rows = Vec::new();
@@ -63,25 +63,24 @@ pub fn run(args: &Args, scans: &[PathBuf]) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// What one run took.
 #[derive(serde::Serialize)]
 struct Row {
     set: String,
     points: u64,
-    /// In the sender's set at the end.
+    /// Number of voxels in the sender's set at the end.
     voxels: u64,
-    /// Of these, at the receiver.
+    /// Number of these voxels that the receiver has.
     found: u64,
-    /// At the receiver and not in the sender's set.
+    /// Number of voxels that only the receiver has.
     wrong: u64,
     is_equal: bool,
     packet_bytes: u64,
-    /// Updates that were sent once more.
+    /// Number of repeated updates.
     again: u64,
     status_bytes: u64,
     ask_bytes: u64,
     answer_bytes: u64,
-    /// Both ways, whether or not they arrived.
+    /// Bytes in both directions, lost packets included.
     total: u64,
     most_a_frame: u64,
 }
@@ -113,7 +112,7 @@ fn measure(args: &Args, path: &Path, counts: &mut [[u64; 2]]) -> anyhow::Result<
         most_a_frame: 0,
     };
     let mut points = 0;
-    // Both know each other before the first scan.
+    // Sender and receiver connect before the first scan.
     let mut now = Duration::ZERO;
     let mut next_scan = REST + REST;
     let mut last_scan = None;
@@ -137,7 +136,7 @@ fn measure(args: &Args, path: &Path, counts: &mut [[u64; 2]]) -> anyhow::Result<
         let last = Some(world.sender.last_packet());
         let is_equal =
             world.sender.is_idle() && world.receiver.is_converged() && world.receiver.equal_as_of() == last;
-        if last_scan.is_some() && (is_equal || rest > if args.no_catch_up { REST } else { PATIENCE }) {
+        if last_scan.is_some() && (is_equal || rest > if args.no_catch_up { REST } else { TIMEOUT }) {
             return Ok(world.row(path, points, is_equal));
         }
     }
@@ -193,7 +192,7 @@ impl World {
     }
 }
 
-/// An entry of the codec's table: 0 where too little was seen.
+/// Returns an entry of the codec's table; 0 if there are too few samples.
 fn prior([zeros, ones]: [u64; 2]) -> u8 {
     match zeros + ones {
         0..4 => 0,

@@ -1,23 +1,23 @@
-//! What a person or a program reads. Either may be gone while there is still work to do, such as maps to write.
+//! Output for people and programs. A closed pipe is no error: there may still be work to do, such as maps to write.
 
 use std::fmt::Display;
 use std::io::{self, ErrorKind, Write};
 
-/// Prints lines on standard output. A reader who is gone misses nothing.
+/// Prints lines on standard output. A closed pipe is ignored.
 ///
 /// # Errors
 ///
 /// Any other failure, such as a full disk.
 pub fn print(lines: impl Display) -> io::Result<()> {
-    unless_gone(writeln!(io::stdout().lock(), "{lines}"))
+    ignore_closed_pipe(writeln!(io::stdout().lock(), "{lines}"))
 }
 
-/// Tells a person of something, on standard error. There is nowhere else to say that this failed.
-pub fn tell(text: impl Display) {
+/// Prints a message on standard error. Ignores a failure, which could not be reported anyway.
+pub fn report(text: impl Display) {
     let _ = writeln!(io::stderr().lock(), "voxtile share: {text}");
 }
 
-fn unless_gone(printed: io::Result<()>) -> io::Result<()> {
+fn ignore_closed_pipe(printed: io::Result<()>) -> io::Result<()> {
     match printed {
         Err(error) if error.kind() == ErrorKind::BrokenPipe => Ok(()),
         printed => printed,

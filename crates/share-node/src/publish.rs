@@ -11,7 +11,7 @@ use voxtile::{InMemoryMapper, MapConfig, MapReader, Mapper, Scan};
 use voxtile_formats::{ReadOptions, ScanSource, open_scans};
 use voxtile_share::{MapWatch, Outgoing, Sender};
 
-/// How often there may be something to send.
+/// Interval at which the sender is polled.
 const STEP: Duration = Duration::from_millis(20);
 
 pub fn run(args: &Args, source: &Path, stop: &AtomicBool) -> anyhow::Result<()> {
@@ -30,7 +30,7 @@ pub fn run(args: &Args, source: &Path, stop: &AtomicBool) -> anyhow::Result<()> 
     let begin = Instant::now();
     let mut next_scan = Duration::ZERO;
     let mut scans = 0_u64;
-    let mut is_said = false;
+    let mut is_reported = false;
     while !stop.load(Ordering::Relaxed) && end.is_none_or(|end| begin.elapsed() < end) {
         let now = begin.elapsed();
         if now >= next_scan
@@ -48,13 +48,13 @@ pub fn run(args: &Args, source: &Path, stop: &AtomicBool) -> anyhow::Result<()> 
             next_scan = now.max(next_scan + period);
         }
         send(&link, &robot, sender.poll(now))?;
-        if !is_said && feed.is_over() && sender.is_idle() {
-            say(args, scans, &mut sender)?;
-            is_said = true;
+        if !is_reported && feed.is_over() && sender.is_idle() {
+            report(args, scans, &mut sender)?;
+            is_reported = true;
         }
         for message in asks(Instant::now() + STEP, stop, |wait| link.next(wait)) {
             if let Some((_, _, Some(receiver))) = parse_key(&message.key) {
-                // Whatever is no ask is not answered.
+                // Malformed requests get no answer.
                 let answers = sender.answer(receiver, &message.bytes, begin.elapsed()).unwrap_or_default();
                 send(&link, &robot, answers)?;
             }
@@ -62,14 +62,14 @@ pub fn run(args: &Args, source: &Path, stop: &AtomicBool) -> anyhow::Result<()> 
     }
     let last = sender.flush(begin.elapsed());
     send(&link, &robot, last)?;
-    if !is_said {
-        say(args, scans, &mut sender)?;
+    if !is_reported {
+        report(args, scans, &mut sender)?;
     }
     link.close();
     Ok(())
 }
 
-/// What comes until a time, or until the stop is set, however much keeps coming.
+/// Yields requests until the deadline or the stop, even if more keep arriving.
 fn asks(
     deadline: Instant,
     stop: &AtomicBool,
@@ -82,7 +82,6 @@ fn asks(
     })
 }
 
-/// Where voxels come from.
 enum Feed {
     Map(Box<MapReader>),
     Scans { source: Box<dyn ScanSource>, mapper: Box<InMemoryMapper>, is_over: bool },
@@ -92,7 +91,7 @@ impl Feed {
     fn open(args: &Args, source: &Path) -> anyhow::Result<Self> {
         match MapReader::open(source, 64 << 20) {
             Ok(map) => return Ok(Self::Map(Box::new(map))),
-            // Then these are scans.
+            // Not a map: open it as scans.
             Err(voxtile::Error::NoMap { .. } | voxtile::Error::Io { .. }) => {}
             Err(error) => return Err(error.into()),
         }
@@ -122,7 +121,7 @@ impl Feed {
     }
 }
 
-/// The next scan in the world frame, with about so many points.
+/// Returns the next scan in the world frame, subsampled to `points`.
 pub fn next(source: &mut dyn ScanSource, points: Option<usize>) -> voxtile::Result<Option<Scan>> {
     let Some(scan) = source.next_scan()? else { return Ok(None) };
     let mut scan = scan.into_scan();
@@ -142,8 +141,8 @@ fn send(link: &Link, robot: &str, packets: Vec<Outgoing>) -> anyhow::Result<()> 
     Ok(())
 }
 
-/// What was shared; once all of it was sent, and by then receivers may have it.
-fn say(args: &Args, scans: u64, sender: &mut Sender) -> anyhow::Result<()> {
+/// Prints the size and digest of the shared set.
+fn report(args: &Args, scans: u64, sender: &mut Sender) -> anyhow::Result<()> {
     let (counts, robot) = (sender.counts(), args.robot[0].to_string());
     let (voxels, digest) = (sender.sent().len(), sender.sent().digest());
     if args.json {
@@ -161,12 +160,12 @@ fn say(args: &Args, scans: u64, sender: &mut Sender) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Another one each time: from the clock, hashed with what is only this process's.
+/// Returns a new epoch for each run: from the clock, hashed with the process id and a random key.
 pub fn epoch() -> u32 {
     random_number() as u32
 }
 
-/// A number that others do not guess.
+/// Returns a number that others cannot guess.
 pub fn random_number() -> u64 {
     use std::hash::{BuildHasher, Hasher, RandomState};
     let mut hasher = RandomState::new().build_hasher();
@@ -184,15 +183,15 @@ mod tests {
     }
 
     #[test]
-    fn asks_without_end_are_left_at_the_deadline() {
+    fn endless_requests_end_at_the_deadline() {
         let (stop, most) = (AtomicBool::new(false), Duration::from_secs(30));
         let begin = Instant::now();
-        let came = asks(begin + STEP, &stop, |_| (begin.elapsed() < most).then(ask)).count();
-        assert!(came > 0 && begin.elapsed() < most);
+        let received = asks(begin + STEP, &stop, |_| (begin.elapsed() < most).then(ask)).count();
+        assert!(received > 0 && begin.elapsed() < most);
     }
 
     #[test]
-    fn asks_without_end_are_left_at_a_stop() {
+    fn endless_requests_end_at_a_stop() {
         let stop = AtomicBool::new(false);
         let mut left = 1000;
         let next = |_| {

@@ -2,59 +2,60 @@ use crate::output;
 use crate::robot_name::RobotName;
 use std::collections::BTreeMap;
 
-/// What is wrong with robots, told once each on standard error.
+/// Problems of robots, each printed once on standard error.
 #[derive(Default)]
 pub struct Reports {
-    /// Of each robot, by kind.
-    told: BTreeMap<(RobotName, Kind), String>,
+    /// Messages by robot and kind.
+    reported: BTreeMap<(RobotName, Kind), String>,
     is_full: bool,
 }
 
-/// What can be wrong with one robot.
+/// Kind of a robot's problem.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Kind {
-    /// Its layer could not be read.
+    /// Its layer file could not be read.
     Read,
-    /// Its layer could not be written.
+    /// Its layer file could not be written.
     Save,
-    /// Its layer could not be folded.
+    /// Its layer could not be folded into the map.
     Fold,
-    /// Its voxels are of another size.
+    /// Its voxel or tile size differs from the map's.
     Grid,
-    /// It sends more than there is room for.
+    /// It sends more than the limits allow.
     Limit,
-    /// It sends what are no packets.
+    /// It sends malformed packets.
     Malformed,
-    /// Nothing can be sent to it.
+    /// Requests to it cannot be sent.
     Ask,
 }
 
-/// More than that are not told: names of robots are made up as easily as packets.
-const MAX_TOLD: usize = 1000;
+/// Maximum number of reports, because anyone can invent robot names.
+const MAX_REPORTS: usize = 1000;
 
 impl Reports {
-    /// Tells of it, if that is new.
-    pub fn tell(&mut self, robot: &RobotName, kind: Kind, text: impl FnOnce() -> String) {
-        if self.told.contains_key(&(robot.clone(), kind)) || self.is_full {
+    /// Prints a problem, unless it is already reported.
+    pub fn report(&mut self, robot: &RobotName, kind: Kind, text: impl FnOnce() -> String) {
+        if self.reported.contains_key(&(robot.clone(), kind)) || self.is_full {
             return;
         }
-        if self.told.len() >= MAX_TOLD {
+        if self.reported.len() >= MAX_REPORTS {
             self.is_full = true;
-            output::tell(format_args!("more than {MAX_TOLD} faults of robots; no further ones are told"));
+            output::report(format_args!(
+                "more than {MAX_REPORTS} problems of robots; no further ones are reported"
+            ));
             return;
         }
         let text = text();
-        output::tell(format_args!("{robot}: {text}"));
-        self.told.insert((robot.clone(), kind), text);
+        output::report(format_args!("{robot}: {text}"));
+        self.reported.insert((robot.clone(), kind), text);
     }
 
-    /// Notes that it is over: next time it is new.
+    /// Removes a solved problem. If it recurs, it is reported again.
     pub fn is_over(&mut self, robot: &RobotName, kind: Kind) {
-        self.told.remove(&(robot.clone(), kind));
+        self.reported.remove(&(robot.clone(), kind));
     }
 
-    /// What was told of a robot.
     pub fn of<'a>(&'a self, robot: &'a RobotName) -> impl Iterator<Item = &'a str> {
-        self.told.iter().filter(move |((name, _), _)| name == robot).map(|(_, text)| text.as_str())
+        self.reported.iter().filter(move |((name, _), _)| name == robot).map(|(_, text)| text.as_str())
     }
 }

@@ -1,7 +1,7 @@
 use std::fmt;
 use std::str::FromStr;
 
-/// The name of a robot: 1 to 32 of `[A-Za-z0-9_-]`, so that it can be part of a key and of a file name.
+/// Name of a robot: 1 to 32 of `[A-Za-z0-9_-]`, valid in a key and in a file name.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct RobotName(String);
 

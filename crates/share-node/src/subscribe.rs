@@ -1,7 +1,7 @@
 use crate::args::{Args, seconds};
 use crate::files::{layers_folder, lengths, load_layer, open_map};
 use crate::json;
-use crate::layer_store::{LayerRoom, LayerStore};
+use crate::layer_store::{LayerLimits, LayerStore};
 use crate::link::{Link, asks_key, parse_key};
 use crate::output;
 use crate::publish::random_number;
@@ -17,17 +17,17 @@ use voxtile::{Error, MapReader, MapView, Mapper};
 use voxtile_share::{ReceiverConfig, Receivers, VoxelSet, merge_layer};
 
 const STEP: Duration = Duration::from_millis(50);
-/// Layers are written to disk so often.
+/// Interval between writes of the layers to disk.
 const SAVE: Duration = Duration::from_secs(30);
-/// How long layers are to be equal to be called so.
+/// Time for which layers must remain equal for `--until-equal`.
 const EQUAL: Duration = Duration::from_secs(3);
-/// Robots that have not said yet what they are. The next one takes the place of the one that waits longest.
+/// Maximum number of robots that have not sent a status yet. The next one replaces the one that waits longest.
 const MAX_UNKNOWN: usize = 256;
 
-/// A robot that is listened to, beside its receiver.
+/// Accepted robot. Its receiver is in [`Subscriber::receivers`].
 struct Robot {
     store: LayerStore,
-    /// Asks have their own key.
+    /// Key of requests to the robot.
     key: String,
     since: Duration,
 }
@@ -35,14 +35,14 @@ struct Robot {
 struct Subscriber<'a> {
     args: &'a Args,
     id: u64,
-    /// The voxels of the map that layers are folded into, if it is there.
+    /// Grid of the map into which layers are folded, if the map exists.
     grid: Option<Grid>,
     region: Option<VoxelBox>,
     folder: PathBuf,
     robots: BTreeMap<RobotName, Robot>,
     receivers: Receivers<RobotName>,
     reports: Reports,
-    /// Whether a robot was turned away.
+    /// Whether a robot was refused for lack of memory or by `--max-robots`.
     has_refused: bool,
     link: Link,
 }
@@ -59,7 +59,7 @@ pub fn run(args: &Args, map: &Path, stop: &AtomicBool) -> anyhow::Result<()> {
     let region = args.region.as_deref().map(|region| box_of(region, grid)).transpose()?;
     let folder = layers_folder(map);
     std::fs::create_dir_all(&folder)
-        .with_context(|| format!("{}: cannot make the folder", folder.display()))?;
+        .with_context(|| format!("{}: cannot create the folder", folder.display()))?;
     let (id, link) = (random_number(), Link::open(args)?);
     let (robots, reports) = (BTreeMap::new(), Reports::default());
     let mut subscriber =
@@ -96,35 +96,35 @@ impl Subscriber<'_> {
         let Some((name, _, _)) = parse_key(key) else { return };
         let Ok(robot) = name.parse::<RobotName>() else { return };
         let is_admitted = self.robots.contains_key(&robot) || self.admit(&robot, now);
-        if is_admitted && (self.is_known(&robot) || self.has_place_for(&robot)) {
+        if is_admitted && (self.is_known(&robot) || self.has_capacity_for(&robot)) {
             let taken = self.receivers.take(&robot, bytes, now);
             if self.is_known(&robot) {
                 self.link.inbox().admit(name, true);
             }
-            self.tell_of(&robot, taken.err().map(|error| error.to_string()));
+            self.report_problems(&robot, taken.err().map(|error| error.to_string()));
         }
         self.link.inbox().has_spent(name, since);
     }
 
-    /// Listens to a robot from now on, if there is room for it.
+    /// Accepts a robot if the limits allow it.
     fn admit(&mut self, robot: &RobotName, now: Duration) -> bool {
         let named = &self.args.robot;
         if !named.is_empty() && !named.contains(robot) {
             return false;
         }
-        if !self.has_place_for(robot) {
+        if !self.has_capacity_for(robot) {
             return false;
         }
         if self.robots.len() - self.receivers.known() >= MAX_UNKNOWN {
             self.dismiss_unknown();
         }
         let mut store = LayerStore::new(&self.folder, robot);
-        let room = LayerRoom {
+        let limits = LayerLimits {
             grid: self.grid,
             max_voxels: self.args.max_voxels,
             max_bytes: self.receivers.free_bytes(),
         };
-        let layer = store.load(robot, room, &mut self.reports);
+        let layer = store.load(robot, limits, &mut self.reports);
         self.receivers.insert(robot.clone(), self.config(), layer);
         let name = robot.to_string();
         let key = asks_key(&name, self.id);
@@ -132,34 +132,34 @@ impl Subscriber<'_> {
         true
     }
 
-    /// Tells of the first robot that there is no room for. There may be any number of them.
+    /// Reports the first refused robot. Others are refused silently: there may be any number of them.
     fn refuse(&mut self, robot: &RobotName, reason: &str) -> bool {
         if !std::mem::replace(&mut self.has_refused, true) {
-            output::tell(format_args!(
-                "{robot}, and maybe others, is not listened to: {reason}; --robot names those that count"
+            output::report(format_args!(
+                "{robot} is refused, possibly others too: {reason}; select robots with --robot"
             ));
         }
         false
     }
 
-    /// Whether a robot has said what it is, or has a layer.
+    /// Returns whether a robot has sent its status or has a saved layer.
     fn is_known(&self, robot: &RobotName) -> bool {
         self.receivers.get(robot).is_some_and(|receiver| receiver.layer().is_some())
     }
 
-    /// Whether one more robot may be known.
-    fn has_place_for(&mut self, robot: &RobotName) -> bool {
+    /// Returns whether the limits allow one more known robot.
+    fn has_capacity_for(&mut self, robot: &RobotName) -> bool {
         if !self.receivers.has_room() {
-            return self.refuse(robot, "there is no memory for one more (--memory)");
+            return self.refuse(robot, "no memory for another robot (--memory)");
         }
         if self.args.robot.is_empty() && self.receivers.known() >= self.args.max_robots {
-            let reason = format!("there are {} robots (--max-robots)", self.args.max_robots);
+            let reason = format!("the limit of {} robots is reached (--max-robots)", self.args.max_robots);
             return self.refuse(robot, &reason);
         }
         true
     }
 
-    /// Stops listening to who has waited longest without saying what it is: names are made up as easily as packets.
+    /// Removes the robot that has waited longest without a status, because anyone can invent robot names.
     fn dismiss_unknown(&mut self) {
         let unknown = self.robots.iter().filter(|(robot, _)| !self.is_known(robot));
         let longest = unknown.min_by_key(|(_, waiting)| waiting.since).map(|(robot, _)| robot.clone());
@@ -180,12 +180,12 @@ impl Subscriber<'_> {
         config
     }
 
-    /// Tells what is wrong with a robot that has said what it is. What others send in its name before is only counted.
-    fn tell_of(&mut self, robot: &RobotName, malformed: Option<String>) {
+    /// Reports the problems of a robot with a known grid. Before that, malformed packets in its name are only counted.
+    fn report_problems(&mut self, robot: &RobotName, malformed: Option<String>) {
         let Some(receiver) = self.receivers.get(robot) else { return };
         if let (Some(grid), Some(ours)) = (receiver.refused_grid(), &self.grid) {
-            self.reports.tell(robot, Kind::Grid, || {
-                format!("has {}, but the map has {}; nothing of it is taken", lengths(grid), lengths(ours))
+            self.reports.report(robot, Kind::Grid, || {
+                format!("has {}, but the map has {}; its voxels are ignored", lengths(grid), lengths(ours))
             });
         }
         if receiver.layer().is_none() {
@@ -193,17 +193,17 @@ impl Subscriber<'_> {
         }
         if receiver.is_over_limit() {
             let counts = receiver.counts();
-            self.reports.tell(robot, Kind::Limit, || {
+            self.reports.report(robot, Kind::Limit, || {
                 let (refused, cut) = (counts.refused_voxels, counts.cut_voxels);
                 format!(
-                    "sends more than there is room for ({refused} voxels refused, {cut} forgotten so far): see \
-                     --memory, --max-voxels, --max-tiles and --region"
+                    "exceeds its limits ({refused} voxels refused, {cut} dropped so far): raise \
+                     --memory, --max-voxels or --max-tiles, or extend --region"
                 )
             });
         }
         if let Some(error) = malformed {
-            self.reports.tell(robot, Kind::Malformed, || {
-                format!("something that is no packet came in its name: {error}; more is only counted")
+            self.reports.report(robot, Kind::Malformed, || {
+                format!("malformed packet: {error}; further ones are only counted")
             });
         }
     }
@@ -214,14 +214,14 @@ impl Subscriber<'_> {
             let Some(robot) = self.robots.get(name) else { continue };
             for ask in receiver.poll(now) {
                 if let Err(error) = self.link.send(&robot.key, ask) {
-                    self.reports.tell(name, Kind::Ask, || format!("{error:#}"));
+                    self.reports.report(name, Kind::Ask, || format!("{error:#}"));
                 }
             }
             self.link.inbox().has_spent(&name.to_string(), since);
         }
     }
 
-    /// Returns whether there is a layer, one of each robot that `--robot` names, and all layers equal their sets.
+    /// Returns whether at least one robot and each robot of `--robot` has a layer, and all layers equal their sets.
     fn is_equal(&self) -> bool {
         let mut layers = self.receivers.iter().filter(|(_, receiver)| receiver.layer().is_some()).peekable();
         let has_layer = |name| self.receivers.get(name).is_some_and(|receiver| receiver.layer().is_some());
@@ -238,21 +238,21 @@ impl Subscriber<'_> {
         }
     }
 
-    /// Saves the layers and folds them into the map, each by itself, and says what there is.
+    /// Saves the layers, folds each into the map and prints a summary.
     fn finish(mut self, map: &Path) -> anyhow::Result<()> {
         self.save();
         let Self { args, mut robots, receivers, mut reports, link, .. } = self;
         link.close();
         let grid = self.grid.or_else(|| grid_of_most(&receivers));
-        // Layers that are in their files make room for the map.
+        // Drop saved layers to free memory for the map.
         let mut left = Vec::new();
         for (name, receiver) in receivers {
             let Some(robot) = robots.remove(&name) else { continue };
             let (is_equal, counts) = (receiver.is_converged(), receiver.counts());
             let Some(mut layer) = receiver.into_layer() else { continue };
-            let told = (layer.len(), layer.digest().to_string(), is_equal, counts);
+            let summary = (layer.len(), layer.digest().to_string(), is_equal, counts);
             let kept = (!robot.store.has(&mut layer)).then_some(layer);
-            left.push((name, robot.store, kept, told));
+            left.push((name, robot.store, kept, summary));
         }
         let (mut at_fault, mut lines) = (Vec::new(), Vec::new());
         for (name, store, kept, (voxels, digest, is_equal, counts)) in left {
@@ -263,7 +263,7 @@ impl Subscriber<'_> {
                     layer.and_then(|layer| fold(map, grid, &layer, args.memory.as_u64() as usize))
                 {
                     is_folded = false;
-                    reports.tell(&name, Kind::Fold, || format!("{error:#}; its layer is not folded"));
+                    reports.report(&name, Kind::Fold, || format!("{error:#}; its layer is not folded"));
                 }
             }
             if !(is_saved && is_folded) {
@@ -280,43 +280,47 @@ impl Subscriber<'_> {
                 let state = if is_equal { "equal to the robot's" } else { "not known to be equal" };
                 let (bytes, ask_bytes) = (counts.bytes, counts.ask_bytes);
                 lines.push(format!("{name}: {voxels} voxels, digest {digest}, {state}"));
-                lines.push(format!("received  {bytes} bytes, asked {ask_bytes} bytes"));
+                lines.push(format!("received  {bytes} bytes, requested with {ask_bytes} bytes"));
             }
         }
-        // Only now: a disk that takes no more of them is no reason not to fold.
+        // Print last: a closed or full output must not prevent folding.
         let printed = lines.iter().try_for_each(output::print);
         if !at_fault.is_empty() {
-            bail!("not saved, or not folded into {}: {}; see above", map.display(), at_fault.join(", "));
+            bail!(
+                "cannot save or fold into {} the layers of {}; see above",
+                map.display(),
+                at_fault.join(", ")
+            );
         }
         Ok(printed?)
     }
 }
 
-/// Folds a layer into a map, which gets what memory the layer leaves.
+/// Folds a layer into a map. The map gets the memory limit minus the size of the layer.
 fn fold(map: &Path, grid: &Grid, layer: &VoxelSet, memory_bytes: usize) -> anyhow::Result<()> {
     if grid.resolution_m().to_bits() != layer.grid().resolution_m().to_bits() {
-        bail!("has {}, but the map has {}", lengths(layer.grid()), lengths(grid));
+        bail!("the layer has {}, but the map has {}", lengths(layer.grid()), lengths(grid));
     }
     let mut mapper = open_map(map, grid, memory_bytes.saturating_sub(layer.memory_bytes()))?;
     merge_layer(layer, &mut mapper)?;
     Ok(mapper.flush()?)
 }
 
-/// For a map that is not there yet: the grid that most robots have, of equally many that of the first by name.
+/// Chooses the grid of a new map: the most frequent grid, or of equally frequent ones the first by robot name.
 fn grid_of_most(receivers: &Receivers<RobotName>) -> Option<Grid> {
     let grids: Vec<Grid> =
         receivers.iter().filter_map(|(_, receiver)| receiver.layer().map(|layer| *layer.grid())).collect();
     let count = |grid: &Grid| grids.iter().filter(|other| *other == grid).count();
-    // Of equals, the last one is the largest.
+    // `max_by_key` returns the last of equal items, so iterate backwards.
     grids.iter().rev().max_by_key(|grid| count(grid)).copied()
 }
 
 fn box_of(region: &[f64], grid: Option<Grid>) -> anyhow::Result<VoxelBox> {
     let grid =
-        grid.ok_or_else(|| Error::argument("--region", "MAP must be there, for the size of its voxels"))?;
+        grid.ok_or_else(|| Error::argument("--region", "MAP must exist, because its voxel size is needed"))?;
     let corner = |at: usize| {
         let corner = grid.voxel_of([region[at], region[at + 1], region[at + 2]]);
-        corner.ok_or_else(|| Error::argument("--region", "a corner is not finite or too far away"))
+        corner.ok_or_else(|| Error::argument("--region", "a corner is not finite or out of range"))
     };
     Ok(VoxelBox { min: corner(0)?, end: corner(3)? })
 }

@@ -1,5 +1,5 @@
-//! A real subscriber under hostile packets, damaged layers and a disk that refuses: it keeps to its memory and goes on
-//! with the others.
+//! A subscriber under hostile packets, damaged layers and a failing disk keeps its memory limit and serves the other
+//! robots.
 
 mod support;
 
@@ -33,7 +33,7 @@ fn open(listen: &str) -> Session {
     zenoh::open(config).wait().unwrap()
 }
 
-/// Says what a robot has to say to be listened to, with whatever lengths.
+/// Answers status requests, so that the subscriber accepts the robot. The claimed set is larger than any limit.
 fn answer_asks(session: &Session, robot: &'static str, resolution_m: f64) -> zenoh::pubsub::Subscriber<()> {
     let answers = session.clone();
     let take = move |sample: zenoh::sample::Sample| {
@@ -59,7 +59,7 @@ fn changes(sequence: u64, voxels: impl Iterator<Item = [i32; 3]>) -> Vec<u8> {
     Packet::Changes { header, repaired: Vec::new(), updates }.encode().unwrap()
 }
 
-/// The peak of a process, in bytes.
+/// Returns the peak resident memory of a process.
 #[cfg(target_os = "linux")]
 fn peak_rss_bytes(process: u32) -> u64 {
     let status = fs::read_to_string(format!("/proc/{process}/status")).unwrap();
@@ -67,24 +67,24 @@ fn peak_rss_bytes(process: u32) -> u64 {
     line.split_whitespace().nth(1).unwrap().parse::<u64>().unwrap() << 10
 }
 
-/// Says what a process tells on standard error, line by line.
-fn told_by(process: &mut Process) -> Receiver<String> {
-    let (out, told) = channel();
+/// Returns the lines that a process prints on standard error.
+fn error_lines(process: &mut Process) -> Receiver<String> {
+    let (out, lines_read) = channel();
     let lines = BufReader::new(process.0.stderr.take().unwrap()).lines();
     std::thread::spawn(move || lines.map_while(Result::ok).try_for_each(|line| out.send(line)));
-    told
+    lines_read
 }
 
-/// Six robots send what takes most memory until there is none, and what is no packet at all; one is honest.
+/// Six robots send expensive voxels until the memory is full, and malformed packets. One robot is honest.
 #[cfg(target_os = "linux")]
 #[test]
 fn a_subscriber_keeps_to_its_memory_and_serves_others_under_hostile_packets() {
     const MEMORY: u64 = 128 << 20;
-    /// What is set aside for a packet.
+    /// Memory reserved for a packet.
     const PACKET: u64 = 21 << 20;
-    /// What a voxel counts that is alone in its tile, at most.
+    /// Upper bound on the memory of a voxel that is alone in its tile.
     const VOXEL: u64 = 1300;
-    const FULL: &str = "sends more than there is room for";
+    const FULL: &str = "exceeds its limits";
     let folder = TempDir::new().unwrap();
     let (honest, hostile, map) = (endpoint(), endpoint(), folder.path().join("map"));
     let session = open(&hostile);
@@ -98,14 +98,14 @@ fn a_subscriber_keeps_to_its_memory_and_serves_others_under_hostile_packets() {
     let mut command = Command::new(SHARE);
     command.args(args).args(more).stdout(Stdio::piped()).stderr(Stdio::piped());
     let mut subscriber = Process(command.spawn().unwrap());
-    let told = told_by(&mut subscriber);
+    let errors = error_lines(&mut subscriber);
     let begin = Instant::now();
     let mut random = Random::of(1, &[]);
     let (mut full, mut full_since) = (BTreeSet::new(), None);
     for sequence in 1.. {
         for robot in robots {
             let corner: [i32; 3] = std::array::from_fn(|_| random.below(1 << 30) as i32 - (1 << 29));
-            // Each alone in its tile.
+            // Each voxel is alone in its tile.
             let alone = (0..800).map(|k| {
                 std::array::from_fn(|axis| corner[axis] + [k % 10, k / 10 % 10, k / 100][axis] * 101)
             });
@@ -118,21 +118,21 @@ fn a_subscriber_keeps_to_its_memory_and_serves_others_under_hostile_packets() {
                 session.put(format!("voxtile/{robot}/packets"), bytes).wait().unwrap();
             }
         }
-        // Names that nobody has, too.
-        session.put(format!("voxtile/nobody-{sequence}/packets"), vec![0; 60_000]).wait().unwrap();
-        let are_told = told.try_iter().filter(|line| line.contains(FULL));
-        full.extend(are_told.filter_map(|line| robots.into_iter().find(|robot| line.contains(robot))));
+        // Also send messages under a new name each time.
+        session.put(format!("voxtile/unknown-{sequence}/packets"), vec![0; 60_000]).wait().unwrap();
+        let reports = errors.try_iter().filter(|line| line.contains(FULL));
+        full.extend(reports.filter_map(|line| robots.into_iter().find(|robot| line.contains(robot))));
         if full.len() >= 4 {
-            // And some time more, in which nothing may come on top.
+            // Continue for a while: memory must not grow further.
             let since = *full_since.get_or_insert_with(Instant::now);
             if since.elapsed() > Duration::from_secs(8) {
                 break;
             }
         }
-        assert!(begin.elapsed() < Duration::from_secs(400), "it is never full: {full:?}");
+        assert!(begin.elapsed() < Duration::from_secs(400), "the memory is never full: {full:?}");
         std::thread::sleep(Duration::from_millis(5));
     }
-    // What the honest robot sent and the flood kept out is asked for again.
+    // The subscriber requests the packets of the honest robot that the flood displaced.
     std::thread::sleep(Duration::from_secs(6));
     let peak = peak_rss_bytes(subscriber.id());
     stop(&subscriber);
@@ -147,7 +147,7 @@ fn a_subscriber_keeps_to_its_memory_and_serves_others_under_hostile_packets() {
     println!("{kept} voxels kept, {refused} refused, {cut} forgotten, {} ms", begin.elapsed().as_millis());
     assert!(peak < MEMORY + (48 << 20), "{peak} bytes");
     assert!(refused > 0, "the memory was never full");
-    // Most of the memory; the rest is for what is remembered of packets.
+    // Layers use most of the memory; the rest holds the state of packets.
     assert!(kept * VOXEL > (MEMORY - PACKET) / 10 * 6, "{kept} voxels");
     let of_honest = of_honest[0];
     assert_eq!((number(of_honest, "/voxels"), &of_honest["digest"]), (voxels, &Value::from(digest)));
@@ -155,10 +155,10 @@ fn a_subscriber_keeps_to_its_memory_and_serves_others_under_hostile_packets() {
     assert!(folder.path().join("map.layers/honest.layer").exists());
 }
 
-/// A layer that is damaged, one that cannot be saved, voxels of another size, a voxel at the end of all indices: each
-/// is one robot's own trouble, is told once, and the others are saved and folded.
+/// A damaged layer, a layer that cannot be saved, another voxel size and a voxel at the end of the index range each
+/// affect one robot. They are reported once, and the other layers are saved and folded.
 #[test]
-fn one_robots_fault_stays_its_own() {
+fn a_fault_of_one_robot_does_not_affect_others() {
     let folder = TempDir::new().unwrap();
     let (honest, other, map) = (endpoint(), endpoint(), folder.path().join("map"));
     let layers = folder.path().join("map.layers");
@@ -196,42 +196,45 @@ fn one_robots_fault_stays_its_own() {
         }
     }
     stop(&subscriber);
-    let (came, is_success) = layers_and_success(&mut subscriber);
-    let mut told = String::new();
-    subscriber.0.stderr.as_mut().unwrap().read_to_string(&mut told).unwrap();
-    println!("{told}");
+    let (received, is_success) = layers_and_success(&mut subscriber);
+    let mut errors = String::new();
+    subscriber.0.stderr.as_mut().unwrap().read_to_string(&mut errors).unwrap();
+    println!("{errors}");
     assert!(!is_success);
-    for (robot, word) in
-        [("damaged", "is kept as"), ("unsaved", "cannot"), ("other-size", "voxels of 0.3 m"), ("honest", "")]
-    {
-        let lines = told.lines().filter(|line| line.contains(&format!("{robot}: "))).count();
-        assert!(lines <= 2, "{robot} is told of {lines} times: {told}");
-        assert!(told.contains(word), "{word}: {told}");
+    for (robot, word) in [
+        ("damaged", "file kept as"),
+        ("unsaved", "cannot"),
+        ("other-size", "voxels of 0.3 m"),
+        ("honest", ""),
+    ] {
+        let lines = errors.lines().filter(|line| line.contains(&format!("{robot}: "))).count();
+        assert!(lines <= 2, "{robot} is reported {lines} times: {errors}");
+        assert!(errors.contains(word), "{word}: {errors}");
     }
     assert_eq!(fs::read(aside(&layers, "damaged")).unwrap(), b"voxtile-layer-1\nand then nothing");
-    let of_honest = came.iter().find(|layer| layer.0 == "honest").unwrap();
+    let of_honest = received.iter().find(|layer| layer.0 == "honest").unwrap();
     assert_eq!((of_honest.1, &of_honest.2, of_honest.3), (voxels, &digest, true));
     for robot in ["honest", "damaged", "far-away", "other-size"] {
         assert!(layers.join(format!("{robot}.layer")).is_file(), "{robot}");
     }
-    // All but that of another size are in the map.
+    // The map contains all layers except the one of another voxel size.
     let map_voxels = voxtile::MapReader::open(&map, 16 << 20).unwrap();
     let folded = voxtile::MapQueries::all_occupied_voxels(&map_voxels, None).unwrap();
     assert!(folded.len() as u64 > voxels);
     assert!(folded.iter().any(|voxel| voxel.index == [i32::MAX - 1, i32::MIN, 0]));
-    // Folded again by hand, the saved layer is known.
+    // Folding the saved layer again succeeds.
     let layer = layers.join("honest.layer");
     let again = run(&["--fold", layer.to_str().unwrap(), "-o", map.to_str().unwrap(), "--json"]);
     assert!(again.status.success());
 }
 
-/// There are bounds to what is told, and none to what is wrong.
+/// The number of reports is bounded, but a failure after the last report still fails the command.
 #[test]
-fn a_layer_that_is_not_folded_is_a_failure_though_nothing_more_is_told() {
-    const FULL: &str = "no further ones are told";
+fn an_unfolded_layer_is_a_failure_after_the_last_report() {
+    const FULL: &str = "no further ones are reported";
     let folder = TempDir::new().unwrap();
     let (honest, other, map) = (endpoint(), endpoint(), folder.path().join("map"));
-    // No map can be made here.
+    // A file with the name of the map prevents its creation.
     fs::write(&map, b"").unwrap();
     let layers = folder.path().join("map.layers");
     fs::create_dir_all(&layers).unwrap();
@@ -246,9 +249,9 @@ fn a_layer_that_is_not_folded_is_a_failure_though_nothing_more_is_told() {
     let mut command = Command::new(SHARE);
     let command = command.args(args).arg(&other).stdout(Stdio::piped()).stderr(Stdio::piped());
     let mut subscriber = Process(command.spawn().unwrap());
-    let told = told_by(&mut subscriber);
+    let errors = error_lines(&mut subscriber);
     let begin = Instant::now();
-    while !told.try_iter().any(|line| line.contains(FULL)) {
+    while !errors.try_iter().any(|line| line.contains(FULL)) {
         assert!(begin.elapsed() < Duration::from_secs(200), "there are never enough faults");
         for robot in &damaged {
             session.put(format!("voxtile/{robot}/packets"), vec![0; 8]).wait().unwrap();
@@ -257,8 +260,8 @@ fn a_layer_that_is_not_folded_is_a_failure_though_nothing_more_is_told() {
     }
     std::thread::sleep(Duration::from_secs(5));
     stop(&subscriber);
-    let (came, is_success) = layers_and_success(&mut subscriber);
-    assert_eq!(came.iter().map(|layer| layer.0.as_str()).collect::<Vec<_>>(), ["honest"]);
+    let (received, is_success) = layers_and_success(&mut subscriber);
+    assert_eq!(received.iter().map(|layer| layer.0.as_str()).collect::<Vec<_>>(), ["honest"]);
     assert!(!is_success);
 }
 
@@ -266,7 +269,7 @@ fn aside(layers: &Path, robot: &str) -> std::path::PathBuf {
     layers.join(format!("{robot}.layer.aside-1"))
 }
 
-/// What does not fit into the least memory, or is no size, is said.
+/// A memory limit below the minimum is refused.
 #[test]
 fn too_little_memory_is_refused() {
     let folder = TempDir::new().unwrap();

@@ -1,4 +1,4 @@
-//! Real processes that share maps over loopback, some with a bad link between them: digests are equal at the end.
+//! Processes that share maps over loopback, some over a lossy link: their digests are equal at the end.
 
 mod support;
 
@@ -9,14 +9,14 @@ use support::{Process, SHARE, endpoint, layers_of, publisher, run, scans, set_of
 use tempfile::TempDir;
 
 #[test]
-fn two_processes_have_equal_sets_and_the_layer_is_folded_into_a_map() {
+fn two_processes_share_a_set_and_fold_the_layer_into_a_map() {
     let folder = TempDir::new().unwrap();
     let (endpoint, map) = (endpoint(), folder.path().join("map"));
     let subscriber = subscriber(&map, &[&endpoint], &["--until-equal", "--for", "120"]);
     let mut publisher = publisher("spotter", &scans(folder.path(), 1, 40), &endpoint);
     let (voxels, digest) = set_of(&mut publisher);
     assert!(voxels > 1000);
-    // It may have been equal for three seconds on the way: another one hears the end.
+    // The first one may have stopped early, when the sets were equal for three seconds: start another at the end.
     drop(subscriber);
     let again = self::subscriber(&map, &[&endpoint], &["--until-equal", "--for", "120"]);
     assert_eq!(layers_of(&mut { again }), [("spotter".to_string(), voxels, digest, true)]);
@@ -25,7 +25,7 @@ fn two_processes_have_equal_sets_and_the_layer_is_folded_into_a_map() {
 }
 
 #[test]
-fn four_processes_and_a_bad_link_that_is_cut() {
+fn four_processes_agree_despite_a_lossy_link_that_is_cut() {
     let folder = TempDir::new().unwrap();
     let robots = [endpoint(), endpoint()];
     let link = endpoint();
@@ -57,7 +57,7 @@ fn four_processes_and_a_bad_link_that_is_cut() {
 }
 
 #[test]
-fn killed_and_started_again_on_either_side() {
+fn both_sides_recover_from_a_kill() {
     let folder = TempDir::new().unwrap();
     let (robot, link, map) = (endpoint(), endpoint(), folder.path().join("map"));
     let scans = scans(folder.path(), 21, 60);
@@ -73,7 +73,7 @@ fn killed_and_started_again_on_either_side() {
     let first = publisher("r", &scans, &robot);
     let listening = subscriber(&map, &[&link], &["--for", "150"]);
     std::thread::sleep(Duration::from_secs(2));
-    // Killed, both of them, in the middle.
+    // Kill both in the middle.
     drop(first);
     drop(listening);
     let mut second = publisher("r", &scans, &robot);
@@ -90,11 +90,11 @@ fn killed_and_started_again_on_either_side() {
     assert_eq!(report["hits"].as_u64(), Some(voxels));
 }
 
-/// Who has no certificate of the fleet hears nothing.
+/// A robot without a certificate of the fleet receives nothing.
 #[test]
-fn over_tls_only_robots_with_a_certificate_of_the_fleet_hear_each_other() {
+fn only_robots_with_a_certificate_of_the_fleet_share_over_tls() {
     let folder = TempDir::new().unwrap();
-    let (fleet, strangers) = (Fleet::new(), Fleet::new());
+    let (fleet, other_fleet) = (Fleet::new(), Fleet::new());
     let config = |name: &str, own: &Fleet| {
         let (certificate, key) = own.robot(name);
         let file = |kind: &str, text: String| {
@@ -121,16 +121,16 @@ fn over_tls_only_robots_with_a_certificate_of_the_fleet_hear_each_other() {
         &[&args[..], &["--rate", "20", "--latency", "0.2", "--zenoh-config", &spotter]].concat(),
     );
     let set = set_of(&mut publisher);
-    let heard = |config: &str, seconds: &str| {
+    let received = |config: &str, seconds: &str| {
         let map = folder.path().join("map");
         let more = ["--zenoh-config", config, "--until-equal", "--for", seconds, "--keep-apart"];
         layers_of(&mut subscriber(&map, &[&endpoint], &more))
     };
-    assert_eq!(heard(&config("stranger", &strangers), "4"), []);
-    assert_eq!(heard(&config("friend", &fleet), "120"), [("spotter".to_string(), set.0, set.1, true)]);
+    assert_eq!(received(&config("intruder", &other_fleet), "4"), []);
+    assert_eq!(received(&config("friend", &fleet), "120"), [("spotter".to_string(), set.0, set.1, true)]);
 }
 
-/// A certificate authority, and those that it signs.
+/// Certificate authority and its members.
 struct Fleet {
     issuer: rcgen::Issuer<'static, rcgen::KeyPair>,
     certificate: String,
@@ -155,7 +155,7 @@ impl Fleet {
 }
 
 #[test]
-fn what_is_wrong_on_the_command_line_is_said() {
+fn errors_on_the_command_line_are_reported() {
     for (args, word) in [
         (vec!["--publish", "x", "--robot", "a/b"], "robot's name"),
         (vec!["--publish", "/nowhere", "--robot", "a"], "/nowhere"),
@@ -165,14 +165,14 @@ fn what_is_wrong_on_the_command_line_is_said() {
         (vec!["--fold", "/nowhere.layer", "-o", "/nowhere"], "/nowhere.layer"),
     ] {
         let output = run(&args);
-        let said = String::from_utf8_lossy(&output.stderr).into_owned();
-        assert!(!output.status.success() && said.contains(word), "{args:?}: {said}");
+        let stderr = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert!(!output.status.success() && stderr.contains(word), "{args:?}: {stderr}");
     }
 }
 
-/// Whoever reads what is said may go first: that is no reason not to fold.
+/// A closed output, for example to `head`, must not prevent folding.
 #[test]
-fn all_layers_are_folded_though_nobody_reads_what_is_said() {
+fn all_layers_are_folded_if_the_output_is_closed() {
     let folder = TempDir::new().unwrap();
     let (robots, map) = ([endpoint(), endpoint()], folder.path().join("map"));
     let mut publishers = [("a", 41, &robots[0]), ("b", 42, &robots[1])]

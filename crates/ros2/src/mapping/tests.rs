@@ -6,7 +6,7 @@ use testkit::faulty_disk::{Fault, FaultyDisk};
 use voxtile::MapPath;
 use voxtile::query::Queries;
 
-/// Where the sensor was, far from another place.
+/// Sensor position; `FAR` is in another tile.
 const NEAR: [f64; 3] = [0.05; 3];
 const FAR: [f64; 3] = [500.05, 0.05, 0.05];
 
@@ -18,7 +18,7 @@ fn open(folder: &Path, options: &[&str]) -> (Mapping, Orders) {
     (Mapping::open(&args, Arc::new(Inbox::new(&args)), placed).unwrap(), orders)
 }
 
-/// The same with its map on a disk that fails as it is told.
+/// Opens a map on a simulated disk.
 fn open_on(disk: &FaultyDisk, folder: &Path, keeps_scans: bool) -> (Mapping, Orders) {
     let (mut mapping, orders) = open(folder, &[]);
     let config = mapping.mapper.config().clone().with_kept_scans(keeps_scans);
@@ -39,17 +39,17 @@ impl Mapping {
         self.insert(&cloud(vec![[2.0, 0.0, 0.0]]), &pose).unwrap();
     }
 
-    /// Waits until the flush that goes on has ended, and looks how.
-    fn end_flush_in_time(&mut self) {
+    /// Waits for the running flush and processes its result.
+    fn end_flush(&mut self) {
         while self.mapper.is_flushing() {
             std::thread::sleep(Duration::from_millis(1));
         }
-        self.flush_in_time().unwrap();
+        self.flush_if_due().unwrap();
     }
 }
 
 #[test]
-fn a_cloud_that_touches_a_damaged_tile_is_counted_and_others_are_mapped() {
+fn a_cloud_on_a_damaged_tile_is_counted_and_others_are_mapped() {
     let folder = tempfile::tempdir().unwrap();
     let (mut mapping, _) = open(folder.path(), &[]);
     mapping.map(NEAR);
@@ -76,46 +76,46 @@ fn a_cloud_that_touches_a_damaged_tile_is_counted_and_others_are_mapped() {
 }
 
 #[test]
-fn after_a_flush_on_a_full_disk_mapping_goes_on_and_the_next_flush_makes_up_for_it() {
+fn mapping_continues_after_a_failed_flush_and_the_next_flush_succeeds() {
     let (folder, disk) = (tempfile::tempdir().unwrap(), FaultyDisk::new(Fault::None));
     let (mut mapping, orders) = open_on(&disk, folder.path(), false);
     mapping.map(NEAR);
     disk.set_fault(Fault::IsFull(0));
-    let asked = std::thread::spawn(move || orders.place(Order::Save));
+    let request = std::thread::spawn(move || orders.place(Order::Save));
     let order = mapping.orders.recv().unwrap();
-    let mut mapping = mapping.obey(order).unwrap();
-    mapping.flush_in_time().unwrap();
-    mapping.end_flush_in_time();
-    let answer = asked.join().unwrap().unwrap_err();
-    assert!(answer.starts_with("the flush has failed: "), "{answer}");
-    mapping.look();
+    let mut mapping = mapping.execute(order).unwrap();
+    mapping.flush_if_due().unwrap();
+    mapping.end_flush();
+    let answer = request.join().unwrap().unwrap_err();
+    assert!(answer.starts_with("the flush failed: "), "{answer}");
+    mapping.sample_health();
     assert!(mapping.live.health().has_flush_failed);
 
-    // A path that waits does not ask the disk after every scan.
+    // A waiting path does not trigger a flush after each scan while the disk fails.
     mapping.path = Some((1, Vec::new()));
     mapping.map(FAR);
-    mapping.flush_in_time().unwrap();
+    mapping.flush_if_due().unwrap();
     let (counters, _) = mapping.inbox.counters();
     assert_eq!((counters.mapped, counters.failed_flushes), (2, 1));
     assert!(!mapping.mapper.is_flushing());
     disk.make_room();
     mapping.flush_every = Duration::ZERO;
-    mapping.flush_in_time().unwrap();
-    mapping.end_flush_in_time();
+    mapping.flush_if_due().unwrap();
+    mapping.end_flush();
     assert_eq!((mapping.mapper.flushed_scan_number(), mapping.has_flush_failed), (2, false));
     assert_eq!(mapping.inbox.counters().0.failed_flushes, 1);
 }
 
 #[test]
-fn a_map_that_cannot_be_flushed_is_not_changed_and_goes_on() {
+fn a_map_that_cannot_be_flushed_is_not_changed_and_mapping_continues() {
     let (folder, disk) = (tempfile::tempdir().unwrap(), FaultyDisk::new(Fault::None));
     let (mut mapping, orders) = open_on(&disk, folder.path(), false);
     mapping.map(NEAR);
     disk.set_fault(Fault::IsFull(0));
-    let asked = std::thread::spawn(move || orders.place(Order::Reset));
+    let request = std::thread::spawn(move || orders.place(Order::Reset));
     let order = mapping.orders.recv().unwrap();
-    let mut mapping = mapping.obey(order).unwrap();
-    assert!(asked.join().unwrap().is_err());
+    let mut mapping = mapping.execute(order).unwrap();
+    assert!(request.join().unwrap().is_err());
     mapping.map(NEAR);
     assert_eq!((mapping.mapper.scan_number(), mapping.inbox.counters().0.failed_flushes), (2, 1));
     disk.make_room();
@@ -123,7 +123,7 @@ fn a_map_that_cannot_be_flushed_is_not_changed_and_goes_on() {
 }
 
 #[test]
-fn a_cloud_that_a_full_disk_refuses_is_counted_and_the_next_one_is_mapped() {
+fn a_cloud_refused_by_a_full_disk_is_counted_and_the_next_one_is_mapped() {
     let (folder, disk) = (tempfile::tempdir().unwrap(), FaultyDisk::new(Fault::None));
     let (mut mapping, _) = open_on(&disk, folder.path(), true);
     disk.set_fault(Fault::IsFull(0));
@@ -135,10 +135,10 @@ fn a_cloud_that_a_full_disk_refuses_is_counted_and_the_next_one_is_mapped() {
 }
 
 #[test]
-fn a_map_at_its_limit_of_memory_is_not_taken_for_malformed_clouds() {
+fn a_map_at_its_memory_limit_does_not_count_clouds_as_malformed() {
     let folder = tempfile::tempdir().unwrap();
     let (mut mapping, _) = open(folder.path(), &["--tile-size", "0.2", "--memory", "20MiB"]);
-    // Each ray crosses hundreds of such small tiles.
+    // Each ray crosses hundreds of these small tiles.
     let around = |k: u32| [60.0 * f64::from(k).cos(), 60.0 * f64::from(k).sin(), 0.1 * f64::from(k)];
     let pose = RigidPose { position_m: NEAR, quaternion: [0.0, 0.0, 0.0, 1.0] };
     mapping.insert(&cloud((0..600).map(around).collect()), &pose).unwrap();
@@ -148,7 +148,7 @@ fn a_map_at_its_limit_of_memory_is_not_taken_for_malformed_clouds() {
 }
 
 #[test]
-fn a_node_that_ends_by_an_error_leaves_what_was_mapped_durable() {
+fn a_node_that_fails_flushes_the_map() {
     let folder = tempfile::tempdir().unwrap();
     let (mut mapping, _) = open(folder.path(), &[]);
     mapping.map(NEAR);
@@ -163,7 +163,7 @@ fn a_node_that_ends_by_an_error_leaves_what_was_mapped_durable() {
 }
 
 #[test]
-fn a_path_that_waits_is_left_out_when_the_map_becomes_what_it_was() {
+fn a_waiting_path_is_dropped_by_a_revert() {
     let folder = tempfile::tempdir().unwrap();
     let (mut mapping, orders) = open(folder.path(), &["--path", "/path"]);
     mapping.map(NEAR);
@@ -172,10 +172,10 @@ fn a_path_that_waits_is_left_out_when_the_map_becomes_what_it_was() {
     mapping.map(NEAR);
     mapping.path = Some((3, Vec::new()));
     assert!(mapping.awaits_flush());
-    let asked = std::thread::spawn(move || orders.place(Order::Revert("before".parse().unwrap())));
+    let request = std::thread::spawn(move || orders.place(Order::Revert("before".parse().unwrap())));
     let order = mapping.orders.recv().unwrap();
-    let mut mapping = mapping.obey(order).unwrap();
-    asked.join().unwrap().unwrap();
+    let mut mapping = mapping.execute(order).unwrap();
+    request.join().unwrap().unwrap();
     mapping.map(NEAR);
     assert_eq!((mapping.mapper.scan_number(), mapping.awaits_flush()), (2, false));
 }

@@ -2,7 +2,7 @@ use ros2_client::Message;
 use serde::{Deserialize, Serialize};
 use voxtile::Aabb;
 
-/// The request of `octomap_msgs/BoundingBoxQuery`: two corners in metres.
+/// Request of `octomap_msgs/BoundingBoxQuery`: two corners in metres.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct BoxRequest {
     pub min: [f64; 3],

@@ -2,23 +2,23 @@ use super::{Octomap, Outcome};
 use ros2_client::Message;
 use serde::{Deserialize, Serialize};
 
-/// The response of `octomap_msgs/GetOctomap`.
+/// Response of `octomap_msgs/GetOctomap`.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct OctomapResponse {
     pub map: Octomap,
 }
 
-/// The request of `voxtile_msgs/GetOctomapInBox`.
+/// Request of `voxtile_msgs/GetOctomapInBox`.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct OctomapInBoxRequest {
     /// Corners in metres.
     pub min: [f64; 3],
     pub max: [f64; 3],
-    /// Free and occupied voxels; otherwise log-odds.
+    /// Whether nodes are free or occupied; otherwise they have log-odds.
     pub binary: bool,
 }
 
-/// The response of `voxtile_msgs/GetOctomapInBox`.
+/// Response of `voxtile_msgs/GetOctomapInBox`.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct OctomapInBoxResponse {
     pub outcome: Outcome,

@@ -15,7 +15,7 @@ pub struct Header {
 }
 
 impl Time {
-    /// Stamps beyond the range of ROS become its ends.
+    /// Converts a time; stamps outside the range of ROS are clamped.
     pub fn from_ns(stamp_ns: i64) -> Self {
         let sec = stamp_ns.div_euclid(1_000_000_000).clamp(i64::from(i32::MIN), i64::from(i32::MAX));
         Self { sec: sec as i32, nanosec: stamp_ns.rem_euclid(1_000_000_000) as u32 }

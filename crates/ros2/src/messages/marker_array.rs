@@ -11,7 +11,7 @@ pub struct Color {
     pub a: f32,
 }
 
-/// `visualization_msgs/Marker`, as it is since Humble.
+/// `visualization_msgs/Marker` since Humble.
 #[derive(Clone, Debug, Serialize)]
 pub struct Marker {
     pub header: Header,
@@ -65,7 +65,7 @@ const ADD: i32 = 0;
 const DELETE: i32 = 2;
 
 impl Marker {
-    /// Cubes of one size and color; without any, what was shown is taken away.
+    /// Returns cubes of one size and color. Without cubes, the marker deletes the previous ones.
     pub fn of_cubes(header: Header, edge_m: f64, color: Color, centers_m: Vec<[f64; 3]>) -> Self {
         Self {
             header,

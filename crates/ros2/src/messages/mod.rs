@@ -1,5 +1,5 @@
-//! Messages that the node sends and requests that it takes, as ROS 2 defines them; `serde` makes CDR of them, in the
-//! order of their fields. The definitions of our own (`voxtile_msgs`) are in `docs/ros2.md`.
+//! ROS 2 messages that the node sends and requests that it receives. `serde` encodes the fields as CDR in their order.
+//! `docs/ros2.md` defines voxtile's own messages (`voxtile_msgs`).
 
 mod box_request;
 mod diagnostic_array;

@@ -6,7 +6,7 @@ use serde::Serialize;
 #[derive(Clone, Debug, Serialize)]
 pub struct MapMetaData {
     pub map_load_time: Time,
-    /// Metres a cell.
+    /// Cell size in metres.
     pub resolution: f32,
     pub width: u32,
     pub height: u32,
@@ -19,7 +19,7 @@ pub struct MapMetaData {
 pub struct OccupancyGrid {
     pub header: Header,
     pub info: MapMetaData,
-    /// Row by row from the smallest y up: -1 unknown, 0 free, 100 occupied, as signed octets.
+    /// Rows in the order of increasing y: -1 unknown, 0 free, 100 occupied, as signed bytes.
     #[serde(with = "sequence")]
     pub data: Vec<u8>,
 }

@@ -8,11 +8,11 @@ pub struct Octomap {
     pub header: Header,
     /// Whether nodes are free or occupied (`.bt`) or have log-odds (`.ot`).
     pub binary: bool,
-    /// OctoMap's name of the tree's class.
+    /// Class name of the tree in OctoMap.
     pub id: String,
-    /// Metres.
+    /// Voxel size in metres.
     pub resolution: f64,
-    /// The nodes alone, without the header of a file.
+    /// Nodes without the header of a file.
     #[serde(with = "sequence")]
     pub data: Vec<u8>,
 }

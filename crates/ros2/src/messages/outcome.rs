@@ -1,7 +1,7 @@
 use ros2_client::Message;
 use serde::{Deserialize, Serialize};
 
-/// The response of `std_srvs/Trigger`, and of services of our own that either succeed or say why not.
+/// Response of `std_srvs/Trigger`, and of voxtile's own services that succeed or fail with a reason.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Outcome {
     pub success: bool,

@@ -29,37 +29,36 @@ pub struct PointCloud2 {
 const FLOAT32: u8 = 7;
 const UINT8: u8 = 2;
 const STEP: u32 = 12;
-/// With a state behind, and aligned.
+/// Point step with the field `state`, padded to alignment.
 const STEP_WITH_STATE: u32 = 16;
 
 impl PointCloud2 {
-    /// A cloud in single precision, as all that reads clouds of ROS takes it.
+    /// Returns a cloud in single precision, which all readers of ROS clouds support.
     pub fn of_points(header: Header, points_m: impl IntoIterator<Item = [f64; 3]>) -> Self {
-        let places = points_m.into_iter().flatten();
-        let data = places.flat_map(|place| (place as f32).to_le_bytes()).collect();
-        Self::of_data(header, places_fields().to_vec(), STEP, data)
+        let coordinates = points_m.into_iter().flatten();
+        let data = coordinates.flat_map(|value| (value as f32).to_le_bytes()).collect();
+        Self::of_data(header, position_fields().to_vec(), STEP, data)
     }
 
-    /// The same with a field `state`.
+    /// Returns a cloud with an additional field `state`.
     pub fn of_states(header: Header, points: impl IntoIterator<Item = ([f64; 3], u8)>) -> Self {
         let mut data = Vec::new();
         for (point_m, state) in points {
-            data.extend(point_m.into_iter().flat_map(|place| (place as f32).to_le_bytes()));
+            data.extend(point_m.into_iter().flat_map(|value| (value as f32).to_le_bytes()));
             data.extend([state, 0, 0, 0]);
         }
-        let mut fields = places_fields().to_vec();
+        let mut fields = position_fields().to_vec();
         fields.push(PointField { name: "state".to_owned(), offset: STEP, datatype: UINT8, count: 1 });
         Self::of_data(header, fields, STEP_WITH_STATE, data)
     }
 
-    /// A cloud whose points take one byte each, and lie on a diagonal.
+    /// Returns a cloud with one byte per point. All points are equal.
     #[cfg(test)]
     pub fn of_bytes(header: Header, points: u32) -> Self {
         let field = |name: &str| PointField { name: name.to_owned(), offset: 0, datatype: UINT8, count: 1 };
         Self::of_data(header, ["x", "y", "z"].map(field).to_vec(), 1, vec![1; points as usize])
     }
 
-    /// As it comes from others.
     #[cfg(test)]
     pub fn cdr(&self) -> Vec<u8> {
         let body = cdr_encoding::to_vec::<_, byteorder::LittleEndian>(self).unwrap();
@@ -82,7 +81,7 @@ impl PointCloud2 {
     }
 }
 
-fn places_fields() -> [PointField; 3] {
+fn position_fields() -> [PointField; 3] {
     [("x", 0), ("y", 4), ("z", 8)].map(|(name, offset)| PointField {
         name: name.to_owned(),
         offset,

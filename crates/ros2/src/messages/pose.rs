@@ -8,7 +8,7 @@ pub struct Pose {
 }
 
 impl Pose {
-    /// Not turned.
+    /// Returns a pose without rotation.
     pub fn at(position: [f64; 3]) -> Self {
         Self { position, orientation: [0.0, 0.0, 0.0, 1.0] }
     }

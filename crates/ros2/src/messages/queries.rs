@@ -3,19 +3,19 @@ use ros2_client::Message;
 use serde::{Deserialize, Serialize};
 use voxtile::Hit;
 
-/// The request of `voxtile_msgs/CastRay`.
+/// Request of `voxtile_msgs/CastRay`.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RayRequest {
     /// Metres.
     pub origin: [f64; 3],
-    /// Of any length but 0.
+    /// Any length except 0.
     pub direction: [f64; 3],
-    /// Metres; 0 for as far as the map reaches.
+    /// Metres; 0 for no limit.
     pub max_range: f64,
     pub unknown_is_obstacle: bool,
 }
 
-/// The request of `voxtile_msgs/CheckCollision`: a ball on its way from one point to another.
+/// Request of `voxtile_msgs/CheckCollision`: a ball that moves in a straight line.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct CollisionRequest {
     /// Metres.
@@ -25,17 +25,17 @@ pub struct CollisionRequest {
     pub unknown_is_obstacle: bool,
 }
 
-/// The response of both: the voxel that is hit.
+/// Response of both requests: the voxel that was hit.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct HitResponse {
-    /// Whether the question could be answered.
+    /// Whether the query succeeded.
     pub outcome: Outcome,
     pub hit: bool,
     /// Center of the voxel, in metres.
     pub center: [f64; 3],
     /// Metres.
     pub distance: f64,
-    /// Of being occupied; -1 for an unknown voxel.
+    /// Occupancy probability; -1 for an unknown voxel.
     pub probability: f64,
 }
 

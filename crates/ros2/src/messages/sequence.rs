@@ -1,4 +1,4 @@
-//! For sequences of octets: written as one block, not number by number.
+//! Serialization of byte sequences as one block.
 
 use serde::{Deserialize, Deserializer, Serializer};
 

@@ -1,17 +1,16 @@
 use crate::args::Args;
 use clap::CommandFactory as _;
 
-/// What a parameter's name means here.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Known {
-    /// A field of the node's options.
+    /// Field of [`Args`].
     Field(String),
-    /// One of octomap_server, or of ROS, that changes nothing here.
+    /// Parameter of octomap_server or ROS that has no effect in this node.
     WithoutEffect,
     Unknown,
 }
 
-/// Names of octomap_server for fields that have others.
+/// Parameter names of octomap_server and the corresponding fields.
 const ALIASES: [(&str, &str); 6] = [
     ("sensor_model.max_range", "max_range"),
     ("sensor_model.min_range", "min_range"),
@@ -21,7 +20,7 @@ const ALIASES: [(&str, &str); 6] = [
     ("sensor_model.max", "clamp_max"),
 ];
 
-/// What is drawn, how topics are latched and compressed, and whose clock counts: the stamps of messages do here.
+/// Parameters for colors, latching, compression and clocks. This node always uses the stamps of messages.
 const WITHOUT_EFFECT: [&str; 8] = [
     "base_frame_id",
     "color",
@@ -33,7 +32,7 @@ const WITHOUT_EFFECT: [&str; 8] = [
     "use_sim_time",
 ];
 
-/// Fields that are for a command line alone.
+/// Fields that only the command line may set.
 const NOT_IN_FILES: [&str; 6] = ["params_file", "node_name", "namespace", "remap", "help", "version"];
 
 impl Known {
@@ -48,13 +47,12 @@ impl Known {
         if is_known { Self::Field(field.to_owned()) } else { Self::Unknown }
     }
 
-    /// All names that mean a field.
+    /// Returns all names that refer to a field.
     pub fn names() -> Vec<String> {
         fields().into_iter().chain(ALIASES.map(|(alias, _)| alias.to_owned())).collect()
     }
 }
 
-/// The fields that files may give.
 fn fields() -> Vec<String> {
     let command = Args::command();
     let fields = command.get_arguments().map(|arg| arg.get_id().to_string());
@@ -66,7 +64,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn names_mean_fields() {
+    fn names_refer_to_fields() {
         let field = |name: &str| Known::Field(name.to_owned());
         assert_eq!(Known::of("resolution"), field("resolution"));
         assert_eq!(Known::of("occupancy_min_z"), field("occupancy_min_z"));

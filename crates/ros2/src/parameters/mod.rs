@@ -1,8 +1,8 @@
-//! Options from what launch files pass and from parameter files of ROS 2. What stands on the command line wins.
+//! Options from launch files and ROS 2 parameter files. The command line has precedence.
 //!
 //! ```text
 //! --ros-args -> options, parameters
-//! file -> parameters of this node -> Known: a field, one without effect, one that is not there -> Args
+//! file -> parameters of this node -> Known: a field, without effect, or unknown -> Args
 //! ```
 
 mod known;

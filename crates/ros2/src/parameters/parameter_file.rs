@@ -5,22 +5,22 @@ use std::fs::File;
 use std::io::Read as _;
 use std::path::Path;
 
-/// The name under which ROS 2 keeps the parameters of a node.
+/// Key of a node's parameters in ROS 2.
 const PARAMETERS: &str = "ros__parameters";
 const MAX_BYTES: u64 = 1 << 20;
 
-/// The parameters that a file has for a node, by their full names. Of two for one name the section counts that says
-/// more precisely which node it means: `/**`, then `/*`, then its name.
+/// Reads the parameters of a node, by their full names. If several sections set a parameter, the most specific one
+/// counts: the node's name, then `/*`, then `/**`.
 ///
 /// # Errors
 ///
-/// A file that cannot be read, or is no parameter file.
+/// A file that cannot be read or is not a parameter file.
 pub fn read(path: &Path, node: &str) -> anyhow::Result<BTreeMap<String, Value>> {
     let mut text = String::new();
     let file = File::open(path).with_context(|| format!("cannot open {}", path.display()))?;
     let bytes = file.take(MAX_BYTES + 1).read_to_string(&mut text);
     let bytes = bytes.with_context(|| format!("cannot read {}", path.display()))?;
-    ensure!(bytes as u64 <= MAX_BYTES, "{}: more than {MAX_BYTES} bytes are no parameters", path.display());
+    ensure!(bytes as u64 <= MAX_BYTES, "{}: the file has more than {MAX_BYTES} bytes", path.display());
     of_text(&text, node).with_context(|| path.display().to_string())
 }
 
@@ -50,7 +50,7 @@ fn parts(name: &str) -> impl Iterator<Item = &str> {
     name.split('/').filter(|part| !part.is_empty())
 }
 
-/// Whether a section's name, with its wildcards, means a node: `*` is one part of a name, `**` are any.
+/// Returns whether a section name with wildcards matches a node: `*` matches one part, `**` any number of parts.
 fn is_for(section: &[&str], node: &[&str]) -> bool {
     match (section, node) {
         ([], []) => true,
@@ -62,7 +62,7 @@ fn is_for(section: &[&str], node: &[&str]) -> bool {
     }
 }
 
-/// The groups of parameters with the names of their nodes; namespaces may be groups themselves.
+/// Collects the parameter groups with the names of their nodes. Namespaces may be groups themselves.
 fn collect<'a>(
     prefix: &str,
     groups: &'a BTreeMap<String, Value>,
@@ -70,7 +70,7 @@ fn collect<'a>(
 ) -> anyhow::Result<()> {
     for (name, group) in groups {
         let name = format!("{prefix}/{}", name.trim_matches('/'));
-        let Value::Group(group) = group else { bail!("{name} is no group with {PARAMETERS}") };
+        let Value::Group(group) = group else { bail!("{name} is not a group with {PARAMETERS}") };
         match group.get(PARAMETERS) {
             Some(Value::Group(parameters)) => into.push((name, parameters)),
             Some(Value::Nothing(())) => {}
@@ -81,7 +81,7 @@ fn collect<'a>(
     Ok(())
 }
 
-/// Groups are parts of names. How deep they can be the reader of YAML limits.
+/// Flattens nested groups into dotted names. The YAML reader limits the depth.
 fn flatten(prefix: &str, group: &BTreeMap<String, Value>, into: &mut BTreeMap<String, Value>) {
     for (name, value) in group {
         let name = format!("{prefix}{}", name.replace('/', "."));
@@ -97,7 +97,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_node_by_name_wins_over_wildcards_and_groups_are_parts_of_names() {
+    fn a_node_name_overrides_wildcards_and_groups_are_flattened() {
         let text = "\
 voxtile_ros2:
   ros__parameters:
@@ -122,7 +122,7 @@ voxtile_ros2:
     }
 
     #[test]
-    fn sections_name_nodes_of_a_namespace() {
+    fn sections_match_nodes_in_a_namespace() {
         let names =
             |text: &str, node: &str| -> Vec<String> { of_text(text, node).unwrap().into_keys().collect() };
         let text = "\
@@ -140,7 +140,7 @@ front: {ros__parameters: {e: 1}}
     }
 
     #[test]
-    fn what_is_no_parameter_file_is_an_error() {
+    fn invalid_parameter_files_are_refused() {
         for wrong in ["7", "- a", "/**: 7", "/**: {resolution: 0.1}", "{", "a: &x [*x]", "/**: {a: 1, a: 2}"]
         {
             assert!(of_text(wrong, "n").is_err(), "{wrong}");

@@ -10,44 +10,44 @@ use std::collections::BTreeMap;
 use std::ffi::OsString;
 use std::path::PathBuf;
 
-/// A parameter, and where it stands.
+/// Value of a parameter and its source for messages.
 struct Given {
     value: Value,
-    place: String,
+    source: String,
 }
 
-/// The options of a command line, of the parameters on it, and of the files that it names; options win over parameters,
-/// and these over files.
+/// Parses the command line with the parameters on it and the files that it names. Options override parameters, which
+/// override files.
 ///
 /// # Errors
 ///
-/// Wrong options; files that cannot be read; parameters that are not known, or have a wrong value.
+/// Invalid options, unreadable files, and unknown or invalid parameters.
 pub fn parse(arguments: &[OsString]) -> Result<Args, Error> {
     let RosArgs { arguments, parameters } = RosArgs::of(arguments).map_err(wrong)?;
     let given = given_by(&arguments, parameters)?;
     let has_output = given.contains_key("output");
-    // What a file gives may be missing here.
+    // The output is optional here if a file sets it.
     let command = Args::command().mut_arg("output", |output| match has_output {
         true => output.required(false).default_value("map"),
         false => output,
     });
     let matches = command.try_get_matches_from(&arguments)?;
     let mut args = Args::from_arg_matches(&matches)?;
-    for (field, Given { value, place }) in &given {
+    for (field, Given { value, source }) in &given {
         if matches.value_source(field) != Some(ValueSource::CommandLine) {
-            args = with(&args, field, value).map_err(|why| wrong(format!("{place}: {why}")))?;
+            args = with(&args, field, value).map_err(|why| wrong(format!("{source}: {why}")))?;
         }
     }
     if args.zenoh_config.is_some() && (args.network || given.contains_key("zenoh_router")) {
-        return Err(wrong("zenoh_config stands in place of zenoh_router and network".to_owned()));
+        return Err(wrong("zenoh_config cannot be combined with zenoh_router or network".to_owned()));
     }
     Ok(args)
 }
 
-/// The fields that files and parameters give; of several for one the last.
+/// Returns the fields that files and parameters set; the last value of each.
 fn given_by(arguments: &[OsString], parameters: Vec<[String; 2]>) -> Result<BTreeMap<String, Given>, Error> {
     let mut given = BTreeMap::new();
-    // Whatever else is wrong with the command line is told later.
+    // Other errors of the command line are reported by the second parse.
     let Ok(named) = Args::command().ignore_errors(true).try_get_matches_from(arguments) else {
         return Ok(given);
     };
@@ -61,40 +61,39 @@ fn given_by(arguments: &[OsString], parameters: Vec<[String; 2]>) -> Result<BTre
     }
     for [name, text] in parameters {
         let value = serde_saphyr::from_str::<Value>(&text);
-        let value = value.map_err(|error| wrong(format!("--param {name}: {text} is no YAML: {error}")))?;
+        let value = value.map_err(|error| wrong(format!("--param {name}: invalid YAML {text}: {error}")))?;
         put(&mut given, "--param", &name, value)?;
     }
     Ok(given)
 }
 
-/// The full name of the node.
 fn node_of(named: &ArgMatches) -> String {
     let text = |id| named.try_get_one::<String>(id).ok().flatten().cloned().unwrap_or_default();
     format!("{}/{}", text("namespace"), text("node_name"))
 }
 
 fn put(given: &mut BTreeMap<String, Given>, source: &str, name: &str, value: Value) -> Result<(), Error> {
-    let place = format!("{source}: parameter {name}");
+    let source = format!("{source}: parameter {name}");
     match Known::of(name) {
-        Known::WithoutEffect => log::warn!("{place} has no effect here"),
+        Known::WithoutEffect => log::warn!("{source} has no effect"),
         Known::Unknown => {
             let names = Known::names().join(", ");
-            return Err(wrong(format!("{place} is not known; known are {names}")));
+            return Err(wrong(format!("{source} is unknown; known parameters: {names}")));
         }
-        // octomap_server's word for no limit.
+        // A negative value of octomap_server means no limit.
         Known::Field(field) if field == "max_range" && is_negative(&value) => {
-            given.insert(field, Given { value: Value::Nothing(()), place });
+            given.insert(field, Given { value: Value::Nothing(()), source });
         }
         Known::Field(field) => {
-            given.insert(field, Given { value, place });
+            given.insert(field, Given { value, source });
         }
     }
     Ok(())
 }
 
-/// The options with another value of one field.
+/// Returns the options with one field replaced.
 fn with(args: &Args, field: &str, value: &Value) -> Result<Args, String> {
-    // Numbers are finite: the reader of YAML takes no others.
+    // All numbers are finite: the YAML reader rejects others.
     let changed = || -> serde_json::Result<Args> {
         let mut fields = serde_json::to_value(args)?;
         fields[field] = serde_json::to_value(value)?;
@@ -137,7 +136,7 @@ mod tests {
 ";
 
     #[test]
-    fn the_file_gives_options_and_the_command_line_wins() {
+    fn the_command_line_overrides_the_file() {
         let args = parsed(FILE, &[]).unwrap();
         assert_eq!((args.resolution, args.max_range, args.hit), (0.2, None, Some(0.8)));
         assert_eq!(
@@ -150,7 +149,7 @@ mod tests {
     }
 
     #[test]
-    fn parameters_of_launch_files_win_over_files_and_options_over_them() {
+    fn launch_parameters_override_files_and_options_override_both() {
         let launch = ["--ros-args", "-p", "resolution:=0.3", "-p", "hit:=0.9", "-p", "cloud:=[/c, d]"];
         let args = parsed(FILE, &launch).unwrap();
         assert_eq!((args.resolution, args.hit, args.miss), (0.3, Some(0.9), None));
@@ -161,13 +160,13 @@ mod tests {
         let args = parsed(named, &["--ros-args", "-r", "__ns:=/robot", "-r", "__node:=mapper"]).unwrap();
         assert_eq!((args.resolution, &*args.namespace, &*args.node_name), (0.7, "/robot", "mapper"));
         for wrong in ["resolutoin:=1", "resolution:=fine", "resolution:={", "network:=7"] {
-            let told = parsed(FILE, &["--ros-args", "-p", wrong]).unwrap_err();
-            assert!(told.contains("--param") && told.contains(wrong.split(':').next().unwrap()), "{told}");
+            let error = parsed(FILE, &["--ros-args", "-p", wrong]).unwrap_err();
+            assert!(error.contains("--param") && error.contains(wrong.split(':').next().unwrap()), "{error}");
         }
     }
 
     #[test]
-    fn what_is_switched_off_later_is_off() {
+    fn later_values_can_switch_options_off() {
         let on = "/**: {ros__parameters: {output: m, network: true, keep_scans: true, max_range: 9.0}}";
         let args = parsed(on, &[]).unwrap();
         assert_eq!((args.network, args.keep_scans, args.max_range), (true, true, Some(9.0)));
@@ -179,10 +178,12 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_known_or_wrong_is_told_with_its_place() {
+    fn errors_name_the_source_of_a_parameter() {
         let with =
             |line: &str| parsed(&format!("/**: {{ros__parameters: {{{line}}}}}"), &["-o", "m"]).unwrap_err();
-        assert!(with("resolutoin: 0.1").contains("p.yaml: parameter resolutoin is not known; known are"));
+        assert!(
+            with("resolutoin: 0.1").contains("p.yaml: parameter resolutoin is unknown; known parameters:")
+        );
         assert!(
             with("resolution: fine").contains("p.yaml: parameter resolution: invalid type: string \"fine\"")
         );
@@ -191,14 +192,14 @@ mod tests {
         for name in ["transform_wait", "pose_tolerance", "path_tolerance"] {
             for (value, why) in [("-1", "give "), ("-1e-9", "give "), ("1e20", "give "), ("'nan'", "invalid")]
             {
-                let told = with(&format!("{name}: {value}"));
-                assert!(told.contains(&format!("p.yaml: parameter {name}: {why}")), "{told}");
-                assert!(why != "give " || told.contains("from 0 to "), "{told}");
+                let error = with(&format!("{name}: {value}"));
+                assert!(error.contains(&format!("p.yaml: parameter {name}: {why}")), "{error}");
+                assert!(why != "give " || error.contains("from 0 to "), "{error}");
             }
         }
         assert!(with("domain_id: 233").contains("give a domain from 0 to 232"));
         assert!(with("cloud: []").contains("give at least one"));
-        assert!(with("zenoh_config: a, network: true").contains("in place of zenoh_router"));
+        assert!(with("zenoh_config: a, network: true").contains("cannot be combined with zenoh_router"));
         assert!(parsed("/**: 7", &["-o", "m"]).unwrap_err().contains("p.yaml"));
         assert!(parsed("{}", &[]).unwrap_err().contains("--output"));
     }

@@ -1,10 +1,10 @@
 use std::io::{self, Cursor, Error, ErrorKind, Read, Seek, SeekFrom, Write};
 
-/// A file in memory that refuses to grow beyond what a message may have.
+/// In-memory file that is limited to the size of a message.
 #[derive(Debug, Default)]
 pub struct BoundedFile(Cursor<Vec<u8>>);
 
-/// Nobody gets a larger one over DDS.
+/// Larger messages are not delivered over DDS.
 const MAX_BYTES: usize = 64 << 20;
 
 impl BoundedFile {
@@ -17,7 +17,7 @@ impl Write for BoundedFile {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         let end = self.0.position().saturating_add(bytes.len() as u64);
         if end > MAX_BYTES as u64 {
-            let reason = format!("the octree has more than {MAX_BYTES} bytes: ask for a smaller box");
+            let reason = format!("the octree has more than {MAX_BYTES} bytes: use a smaller box");
             return Err(Error::new(ErrorKind::FileTooLarge, reason));
         }
         self.0.write(bytes)
@@ -45,7 +45,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn it_refuses_what_is_too_much_and_keeps_what_it_has() {
+    fn a_write_beyond_the_limit_fails_and_changes_nothing() {
         let mut file = BoundedFile::default();
         file.write_all(&[7; 3]).unwrap();
         file.seek(SeekFrom::Start(MAX_BYTES as u64 - 1)).unwrap();

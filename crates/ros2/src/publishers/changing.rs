@@ -13,20 +13,21 @@ pub struct Changing {
     viewers: Viewers,
 }
 
-/// Messages that who comes late gets, before a whole one.
+/// Number of cached messages, which new subscribers get before a complete one.
 const DEPTH: usize = 10;
 
 impl Changing {
     /// # Errors
     ///
-    /// The transport refuses.
+    /// The transport cannot create the publisher.
     pub fn new(transport: &mut Transport, topic: &str) -> anyhow::Result<Self> {
         let sender =
             transport.advertise(topic, TypeName::new("sensor_msgs", "PointCloud2"), Qos::latched(DEPTH))?;
         Ok(Self { topic: topic.to_owned(), sender, viewers: Viewers::new(Instant::now()) })
     }
 
-    /// Sends what changed of the occupied voxels in a box, if somebody listens; to who is new, and now and then, all.
+    /// Sends the changes of the occupied voxels in a box, if there are subscribers. Sends all occupied voxels to new
+    /// subscribers and at an interval.
     pub fn refresh(
         &mut self,
         version: MapVersion,
@@ -35,18 +36,18 @@ impl Changing {
         header: Header,
         occupied: impl FnOnce() -> anyhow::Result<Vec<VoxelIndex>>,
     ) {
-        if !self.viewers.are_to_hear(self.sender.listeners(), version, Instant::now()) {
+        if !self.viewers.needs_update(self.sender.subscribers(), version, Instant::now()) {
             return;
         }
         let mut occupied = match occupied() {
             Ok(occupied) => occupied,
             Err(error) if is_expired(&error) => {
-                log::debug!("{}: tried again: {error}", self.topic);
+                log::debug!("{}: will retry: {error}", self.topic);
                 return;
             }
             Err(error) => {
                 log::warn!("{}: not sent: {error:#}", self.topic);
-                // The same map would fail again.
+                // Do not retry: the same map would fail again.
                 self.viewers.note_failed(version);
                 return;
             }
@@ -56,10 +57,10 @@ impl Changing {
         if !changes.is_empty() || self.viewers.is_whole_due() {
             let points = changes.into_iter().map(|(voxel, state)| (grid.center_m(voxel), state as u8));
             if let Err(error) = self.sender.send(PointCloud2::of_states(header, points)) {
-                log::debug!("{}: not sent, tried again: {error}", self.topic);
+                log::debug!("{}: not sent, will retry: {error}", self.topic);
                 return;
             }
         }
-        self.viewers.note_told(version, occupied, Instant::now());
+        self.viewers.note_sent(version, occupied, Instant::now());
     }
 }

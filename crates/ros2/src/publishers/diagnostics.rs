@@ -3,14 +3,14 @@ use crate::health::Health;
 use crate::messages::{DiagnosticArray, DiagnosticStatus, Header, KeyValue, Time};
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
-/// How the node does, since the last such message.
+/// Returns the diagnostics. Rates and losses are since the previous message.
 pub fn diagnostics(
     node_name: &str,
     health: &Health,
     [before, now]: [&Counters; 2],
     waiting: usize,
     since: Duration,
-    trouble: Option<&str>,
+    problem: Option<&str>,
 ) -> DiagnosticArray {
     let dropped = [
         ("dropped_behind", now.dropped_behind, before.dropped_behind),
@@ -65,7 +65,7 @@ pub fn diagnostics(
         ("stalls", statistics.stalls.count.to_string()),
         ("worst_stall_ms", (statistics.stalls.worst_us / 1000).to_string()),
     ]);
-    let (level, message) = summary(&why, trouble, health.has_flush_failed);
+    let (level, message) = summary(&why, problem, health.has_flush_failed);
     let values = values.into_iter().map(|(key, value)| KeyValue { key: key.to_owned(), value }).collect();
     let status = DiagnosticStatus {
         level,
@@ -79,35 +79,35 @@ pub fn diagnostics(
     DiagnosticArray { header: Header { stamp, frame_id: String::new() }, status: vec![status] }
 }
 
-/// How bad it is, and what is to be done where the node cannot help itself.
-fn summary(losses: &[&str], trouble: Option<&str>, has_flush_failed: bool) -> (u8, String) {
+/// Returns the level and message of the status, with a remedy for problems that the node cannot solve.
+fn summary(losses: &[&str], problem: Option<&str>, has_flush_failed: bool) -> (u8, String) {
     let remedies = losses.iter().filter_map(|loss| remedy(loss));
-    let remedies: Vec<&str> = remedies.chain(has_flush_failed.then_some(AFTER_FAILED_FLUSH)).collect();
+    let remedies: Vec<&str> = remedies.chain(has_flush_failed.then_some(FAILED_FLUSH)).collect();
     let level = match (losses, &*remedies) {
-        ([], []) if trouble.is_none() => return (DiagnosticStatus::OK, "mapping".to_owned()),
-        // Only some places are not mapped.
-        (_, [] | [OF_DAMAGE]) => DiagnosticStatus::WARN,
+        ([], []) if problem.is_none() => return (DiagnosticStatus::OK, "mapping".to_owned()),
+        // Damage affects only some tiles, so the node still maps.
+        (_, [] | [DAMAGED_TILES]) => DiagnosticStatus::WARN,
         _ => DiagnosticStatus::ERROR,
     };
     let losses = if losses.is_empty() { None } else { Some(format!("losses: {}", losses.join(", "))) };
-    let trouble = trouble.map(str::to_owned);
-    let parts = losses.into_iter().chain(trouble).chain(remedies.into_iter().map(str::to_owned));
+    let problem = problem.map(str::to_owned);
+    let parts = losses.into_iter().chain(problem).chain(remedies.into_iter().map(str::to_owned));
     let parts: Vec<String> = parts.collect();
     (level, parts.join("; "))
 }
 
-const OF_DAMAGE: &str =
-    "tiles of the map are damaged: end the node, and see `voxtile verify` and `voxtile repair`";
-const AFTER_FAILED_FLUSH: &str = "the last flush has failed: make room on the disk, or see what the log says";
+const DAMAGED_TILES: &str =
+    "tiles of the map are damaged: stop the node and run `voxtile verify` and `voxtile repair`";
+const FAILED_FLUSH: &str = "the last flush failed: free disk space, or see the log";
 
 fn remedy(loss: &str) -> Option<&'static str> {
     match loss {
         "refused_memory" => Some(
-            "the map is at its limit of memory: start the node again with more --memory, or begin a map with a larger \
+            "the map is at its memory limit: restart the node with a larger --memory, or create a map with a larger \
              --tile-size",
         ),
-        "refused_damaged" => Some(OF_DAMAGE),
-        "refused_disk" => Some("the disk refuses: make room on it, or see what the log says"),
+        "refused_damaged" => Some(DAMAGED_TILES),
+        "refused_disk" => Some("writes to disk fail: free disk space, or see the log"),
         _ => None,
     }
 }
@@ -120,18 +120,18 @@ mod tests {
     fn new_losses_are_a_warning_and_old_ones_are_not() {
         let before = Counters { malformed: 3, mapped: 10, ..Counters::default() };
         let now = Counters { dropped_behind: 1, mapped: 30, ..before };
-        let told = |counters| {
+        let status_of = |counters| {
             let array = diagnostics("n", &Health::default(), counters, 0, Duration::from_secs(2), None);
             let [status] = array.status.try_into().unwrap();
             (status.level, status.message, status.values.first().unwrap().value.clone())
         };
         let warning = (DiagnosticStatus::WARN, "losses: dropped_behind".to_owned(), "10.00".to_owned());
-        assert_eq!(told([&before, &now]), warning);
-        assert_eq!(told([&now, &now]), (DiagnosticStatus::OK, "mapping".to_owned(), "0.00".to_owned()));
+        assert_eq!(status_of([&before, &now]), warning);
+        assert_eq!(status_of([&now, &now]), (DiagnosticStatus::OK, "mapping".to_owned(), "0.00".to_owned()));
     }
 
     #[test]
-    fn why_no_cloud_gets_a_pose_is_a_warning() {
+    fn missing_poses_are_a_warning() {
         let (health, none) = (Health::default(), Counters::default());
         let array = diagnostics("n", &health, [&none; 2], 0, Duration::from_secs(1), Some("no pose: why"));
         let [status] = array.status.try_into().unwrap();
@@ -139,8 +139,8 @@ mod tests {
     }
 
     #[test]
-    fn what_the_node_cannot_mend_says_what_to_do() {
-        let told = |now: Counters, has_flush_failed| {
+    fn problems_that_need_a_person_include_a_remedy() {
+        let status_of = |now: Counters, has_flush_failed| {
             let health = Health { has_flush_failed, ..Health::default() };
             let array =
                 diagnostics("n", &health, [&Counters::default(), &now], 0, Duration::from_secs(1), None);
@@ -148,21 +148,21 @@ mod tests {
             (status.level, status.message)
         };
         let none = Counters::default();
-        let (level, message) = told(Counters { refused_damaged: 1, ..none }, false);
+        let (level, message) = status_of(Counters { refused_damaged: 1, ..none }, false);
         assert_eq!(level, DiagnosticStatus::WARN);
         assert!(
             message.starts_with("losses: refused_damaged; ") && message.contains("voxtile repair"),
             "{message}"
         );
-        let (level, message) = told(Counters { refused_memory: 1, malformed: 1, ..none }, false);
+        let (level, message) = status_of(Counters { refused_memory: 1, malformed: 1, ..none }, false);
         assert_eq!(level, DiagnosticStatus::ERROR);
         assert!(message.starts_with("losses: malformed, refused_memory; "), "{message}");
-        assert!(message.contains("more --memory"), "{message}");
-        let (level, message) = told(Counters { refused_disk: 1, ..none }, false);
-        assert!(level == DiagnosticStatus::ERROR && message.contains("make room"), "{message}");
-        let (level, message) = told(none, true);
+        assert!(message.contains("larger --memory"), "{message}");
+        let (level, message) = status_of(Counters { refused_disk: 1, ..none }, false);
+        assert!(level == DiagnosticStatus::ERROR && message.contains("free disk space"), "{message}");
+        let (level, message) = status_of(none, true);
         assert!(
-            level == DiagnosticStatus::ERROR && message.starts_with("the last flush has failed"),
+            level == DiagnosticStatus::ERROR && message.starts_with("the last flush failed"),
             "{message}"
         );
     }

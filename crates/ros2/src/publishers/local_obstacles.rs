@@ -4,11 +4,11 @@ use anyhow::ensure;
 use voxtile::Aabb;
 use voxtile_local::{LocalView, Obstacle};
 
-/// The centers of the obstacles of a local map in a box.
+/// Returns the centers of the obstacles of a local map in a box.
 ///
 /// # Errors
 ///
-/// More of them than a message may have.
+/// More obstacles than a message may contain.
 pub fn local_obstacles(
     view: &LocalView,
     region: &Aabb,
@@ -19,7 +19,7 @@ pub fn local_obstacles(
     let count = centers_m.len();
     ensure!(
         count <= MAX_VOXELS,
-        "{count} voxels, and a message has at most {MAX_VOXELS}: take a smaller --publish-radius"
+        "{count} voxels exceed the limit of {MAX_VOXELS} per message: use a smaller --publish-radius"
     );
     Ok(PointCloud2::of_points(header, centers_m))
 }

@@ -1,11 +1,11 @@
-//! What the node publishes of the map, under the names of octomap_server.
+//! Publishers of the map, on topics with the names of octomap_server.
 //!
 //! ```text
 //! LiveMap -> LiveView -> octomap, occupied_voxels, projected_map -> messages
-//! occupied_voxels -> VoxelChanges -> Viewers -> Changing: what they do not know yet
+//! occupied_voxels -> VoxelChanges -> Viewers -> Changing: sends changes
 //! LocalView -> local_obstacles -> messages
 //! Health, Counters -> diagnostics
-//! Publishing: one thread beside the mapper; Outlet: a topic, and what was sent last
+//! Publishing: one thread, concurrent with the mapper; Outlet: a topic and the last sent version
 //! ```
 
 mod bounded_file;

@@ -3,15 +3,15 @@ use crate::messages::{Color, Header, Marker, MarkerArray, PointCloud2};
 use anyhow::bail;
 use voxtile::{Aabb, MapQueries, MapView, VoxelIndex};
 
-/// Most voxels of a message: nobody gets a larger one over DDS.
+/// Maximum number of voxels in a message: larger messages are not delivered over DDS.
 pub(super) const MAX_VOXELS: usize = 4 << 20;
 const COLOR: Color = Color { r: 0.0, g: 0.0, b: 1.0, a: 1.0 };
 
-/// The occupied voxels of a region that reach between the heights.
+/// Returns the occupied voxels of a region that overlap the range of heights.
 ///
 /// # Errors
 ///
-/// More of them than a message may have; a tile that cannot be read.
+/// More voxels than a message may contain, or a tile that cannot be read.
 pub fn occupied_voxels(
     map: &impl MapView,
     region: &Aabb,
@@ -29,7 +29,7 @@ pub fn occupied_voxels(
     })?;
     if count > MAX_VOXELS {
         bail!(
-            "{count} occupied voxels, and a message has at most {MAX_VOXELS}: take a smaller --publish-radius"
+            "{count} occupied voxels exceed the limit of {MAX_VOXELS} per message: use a smaller --publish-radius"
         );
     }
     Ok(voxels)
@@ -40,7 +40,7 @@ fn centers_m(map: &impl MapView, region: &Aabb, extent: &Extent) -> anyhow::Resu
     Ok(occupied_voxels(map, region, extent)?.into_iter().map(|voxel| grid.center_m(voxel)).collect())
 }
 
-/// They as a cloud.
+/// Returns the occupied voxels as a cloud.
 pub fn cloud(
     map: &impl MapView,
     region: &Aabb,
@@ -50,7 +50,7 @@ pub fn cloud(
     Ok(PointCloud2::of_points(header, centers_m(map, region, extent)?))
 }
 
-/// They as cubes.
+/// Returns the occupied voxels as cubes.
 pub fn markers(
     map: &impl MapView,
     region: &Aabb,

@@ -5,16 +5,16 @@ use voxtile::octree::OctreeFormat;
 use voxtile::query::OctreeExport;
 use voxtile::{Aabb, MapQueries, MapView};
 
-/// Memory for the part of the tree that is built at a time.
+/// Memory for each part of the tree that is built separately.
 const MEMORY_BYTES: usize = 32 << 20;
-/// The line that ends the header of a file.
+/// Last line of a file's header.
 const LAST_HEADER_LINE: &[u8] = b"\ndata\n";
 
-/// The voxels of a region as OctoMap's tree, as `octomap_msgs::msgToMap` reads it.
+/// Returns the voxels of a region as an OctoMap tree for `octomap_msgs::msgToMap`.
 ///
 /// # Errors
 ///
-/// Voxels beyond OctoMap's keys; more than a message may have; a tile that cannot be read.
+/// Voxels outside OctoMap's keys, a tree larger than a message may be, or a tile that cannot be read.
 pub fn octomap(
     map: &impl MapView,
     region: &Aabb,

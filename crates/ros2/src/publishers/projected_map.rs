@@ -3,15 +3,15 @@ use crate::messages::{Header, MapMetaData, OccupancyGrid, Pose};
 use voxtile::query::Column;
 use voxtile::{Aabb, Grid, MapQueries, MapView};
 
-/// Most cells along an edge of a map without voxels, around the middle of its region: such a message comes through.
+/// Maximum number of cells along each edge of an empty map, which limits the size of the message.
 const MAX_EMPTY_CELLS: f64 = 1000.0;
 
-/// The voxels of a region from above, cell by cell what `voxtile export` writes for nav2. Without voxels all of the
-/// region is unknown: nav2 takes no map without cells, and would keep the one before.
+/// Projects a region to a 2D occupancy grid with the same cells as `voxtile export` for nav2. Without voxels the whole
+/// region is unknown: nav2 ignores a grid without cells and would keep the previous one.
 ///
 /// # Errors
 ///
-/// Too many cells; a tile that cannot be read.
+/// Too many cells, or a tile that cannot be read.
 pub fn projected_map(
     map: &impl MapView,
     region: &Aabb,
@@ -42,12 +42,12 @@ pub fn projected_map(
     Ok(OccupancyGrid { header, info, data })
 }
 
-/// Where the cells of a region without voxels begin along an axis, in metres, and how many there are.
+/// Returns the start, in metres, and the number of cells of an empty region along an axis.
 fn empty_cells(grid: &Grid, region: &Aabb, axis: usize) -> (f64, u32) {
     let edge_m = grid.resolution_m();
     let [least_m, most_m] = [region.min[axis], region.max[axis]];
     let middle_m = 0.5 * (least_m + most_m);
-    // Of a region without an end there is none.
+    // An infinite region has no center.
     let middle_m = if middle_m.is_finite() { middle_m } else { 0.0 };
     let reach_m = (0.5 * (most_m - least_m)).min(0.5 * MAX_EMPTY_CELLS * edge_m);
     let first = ((middle_m - reach_m) / edge_m).floor();
@@ -69,7 +69,7 @@ mod tests {
     use voxtile::{MapConfig, OutOfCoreTileMapper};
 
     #[test]
-    fn a_map_without_voxels_is_unknown_all_over_its_region() {
+    fn an_empty_map_is_unknown_in_the_whole_region() {
         let folder = tempfile::tempdir().unwrap();
         let config = MapConfig::new(0.5, 16.0).unwrap();
         let map = OutOfCoreTileMapper::create(folder.path().join("map"), config).unwrap();
@@ -77,14 +77,14 @@ mod tests {
             let extent = Extent { radius_m, heights_m: [f64::NEG_INFINITY, f64::INFINITY] };
             projected_map(&map, &extent.around([10.0, -20.0, 0.0]), &extent, Header::default()).unwrap()
         };
-        let flat = of(2.2);
-        assert_eq!((flat.info.width, flat.info.height, flat.data.len()), (10, 10, 100));
-        assert_eq!(flat.info.origin, Pose::at([7.5, -22.5, 0.0]));
-        assert!(flat.data.iter().all(|cell| *cell == OccupancyGrid::UNKNOWN));
+        let projected = of(2.2);
+        assert_eq!((projected.info.width, projected.info.height, projected.data.len()), (10, 10, 100));
+        assert_eq!(projected.info.origin, Pose::at([7.5, -22.5, 0.0]));
+        assert!(projected.data.iter().all(|cell| *cell == OccupancyGrid::UNKNOWN));
         for (radius_m, least, most) in [(1e-9, 1, 2), (1e9, 1000, 1001), (f64::INFINITY, 1000, 1001)] {
-            let flat = of(radius_m);
-            assert!((least..=most).contains(&flat.info.width), "{radius_m}: {}", flat.info.width);
-            assert_eq!(flat.data.len(), flat.info.width as usize * flat.info.height as usize);
+            let projected = of(radius_m);
+            assert!((least..=most).contains(&projected.info.width), "{radius_m}: {}", projected.info.width);
+            assert_eq!(projected.data.len(), projected.info.width as usize * projected.info.height as usize);
         }
     }
 }

@@ -17,7 +17,7 @@ use std::time::{Duration, Instant};
 use voxtile::octree::OctreeFormat;
 use voxtile_local::Obstacle;
 
-/// The thread that publishes the map, beside the mapper: it reads views, for which no mapper waits.
+/// Publishing thread. It reads views, so the mapper never waits for it.
 pub struct Publishing {
     inbox: Arc<Inbox>,
     map: Arc<LiveMap>,
@@ -35,13 +35,13 @@ pub struct Publishing {
     diagnosing: Diagnosing,
 }
 
-/// How long it sleeps before it looks whether it is to end.
-const NAP: Duration = Duration::from_millis(20);
+/// Interval between checks of the stop flag.
+const POLL_EVERY: Duration = Duration::from_millis(20);
 
 impl Publishing {
     /// # Errors
     ///
-    /// Rates and lengths that are none; the transport refuses.
+    /// Invalid rates or lengths, or a transport that cannot create a publisher.
     pub fn new(
         args: &Args,
         transport: &mut Transport,
@@ -76,7 +76,6 @@ impl Publishing {
         })
     }
 
-    /// Publishes until it is told to stop.
     pub fn run(&mut self, stop: &AtomicBool) {
         let mut begun = Instant::now();
         while !stop.load(Ordering::Relaxed) {
@@ -85,11 +84,11 @@ impl Publishing {
                 self.refresh();
             }
             self.diagnosing.refresh(&self.inbox, &self.map);
-            std::thread::sleep(NAP);
+            std::thread::sleep(POLL_EVERY);
         }
     }
 
-    /// Each message has a view of its own, which is held no longer than it takes.
+    /// Publishes new versions. Each message uses a view of its own, which is dropped as soon as possible.
     fn refresh(&mut self) {
         let (map, extent) = (&self.map, &self.extent);
         let moment = map.moment();
@@ -103,7 +102,7 @@ impl Publishing {
         let occupied = || occupied_voxels(&map.view(), &around, extent);
         self.changing.refresh(version, map.grid(), &around, header(), occupied);
         let is_wanted = self.local_occupied.is_wanted() || self.local_inflated.is_wanted();
-        map.local().want(is_wanted);
+        map.local().set_wanted(is_wanted);
         if let Some(view) = map.local().view() {
             let cloud = |obstacle| local_obstacles(&view, &around, obstacle, header());
             self.local_occupied.refresh(version, || cloud(Obstacle::Occupied));

@@ -1,25 +1,25 @@
 use std::cmp::Ordering;
 use voxtile::VoxelIndex;
 
-/// What a viewer is told of a voxel.
+/// Published state of a voxel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum VoxelState {
-    /// It is free or unknown now.
+    /// The voxel is free or unknown.
     NotOccupied = 0,
     Occupied = 1,
-    /// It is not in the box any more; nothing else is said of it.
+    /// The voxel has left the box; its state is not published.
     OutOfBox = 2,
 }
 
-/// The occupied voxels that viewers know of, in order.
+/// Sorted occupied voxels that were sent to viewers.
 #[derive(Debug, Default)]
 pub struct VoxelChanges {
-    told: Vec<VoxelIndex>,
+    sent: Vec<VoxelIndex>,
 }
 
 impl VoxelChanges {
-    /// What viewers have to be told, so that they know of these voxels; all of them for viewers that know of none.
-    /// Telling it twice changes nothing.
+    /// Returns the changes from the sent voxels to `occupied`; with `is_whole` also the unchanged occupied voxels.
+    /// Applying the changes twice has no further effect.
     pub fn to(
         &self,
         occupied: &[VoxelIndex],
@@ -27,7 +27,7 @@ impl VoxelChanges {
         is_in_box: impl Fn(VoxelIndex) -> bool,
     ) -> Vec<(VoxelIndex, VoxelState)> {
         let (mut changes, mut before, mut now) =
-            (Vec::new(), self.told.iter().peekable(), occupied.iter().peekable());
+            (Vec::new(), self.sent.iter().peekable(), occupied.iter().peekable());
         loop {
             let order = match (before.peek(), now.peek()) {
                 (Some(old), Some(new)) => old.cmp(new),
@@ -35,9 +35,9 @@ impl VoxelChanges {
                 (None, Some(_)) => Ordering::Greater,
                 (None, None) => return changes,
             };
-            let gone = if order.is_le() { before.next() } else { None };
-            let here = if order.is_ge() { now.next() } else { None };
-            match (gone, here) {
+            let old = if order.is_le() { before.next() } else { None };
+            let new = if order.is_ge() { now.next() } else { None };
+            match (old, new) {
                 (Some(_), Some(voxel)) if is_whole => changes.push((*voxel, VoxelState::Occupied)),
                 (None, Some(voxel)) => changes.push((*voxel, VoxelState::Occupied)),
                 (Some(voxel), None) => {
@@ -52,9 +52,9 @@ impl VoxelChanges {
         }
     }
 
-    /// Viewers know of these now, which are in order.
+    /// Replaces the sent voxels. They must be sorted.
     pub fn note(&mut self, occupied: Vec<VoxelIndex>) {
-        self.told = occupied;
+        self.sent = occupied;
     }
 }
 
@@ -67,23 +67,23 @@ mod tests {
         xs.iter().map(|&x| [x, 7, -x]).collect()
     }
 
-    fn told(changes: &VoxelChanges, xs: &[i32], is_whole: bool) -> Vec<(i32, VoxelState)> {
-        let told = changes.to(&voxels(xs), is_whole, |voxel| voxel[0] < 10);
-        told.into_iter().map(|(voxel, state)| (voxel[0], state)).collect()
+    fn changed(changes: &VoxelChanges, xs: &[i32], is_whole: bool) -> Vec<(i32, VoxelState)> {
+        let found = changes.to(&voxels(xs), is_whole, |voxel| voxel[0] < 10);
+        found.into_iter().map(|(voxel, state)| (voxel[0], state)).collect()
     }
 
     #[test]
-    fn what_changed_is_told_and_what_did_not_only_to_who_knows_nothing() {
+    fn only_changes_are_sent_unless_all_voxels_are_due() {
         let mut changes = VoxelChanges::default();
-        assert_eq!(told(&changes, &[1, 3], false), [(1, Occupied), (3, Occupied)]);
+        assert_eq!(changed(&changes, &[1, 3], false), [(1, Occupied), (3, Occupied)]);
         changes.note(voxels(&[1, 3, 5, 12]));
-        assert_eq!(told(&changes, &[1, 3, 5, 12], false), []);
+        assert_eq!(changed(&changes, &[1, 3, 5, 12], false), []);
         assert_eq!(
-            told(&changes, &[3, 4], false),
+            changed(&changes, &[3, 4], false),
             [(1, NotOccupied), (4, Occupied), (5, NotOccupied), (12, OutOfBox)]
         );
         assert_eq!(
-            told(&changes, &[3, 4], true),
+            changed(&changes, &[3, 4], true),
             [(1, NotOccupied), (3, Occupied), (4, Occupied), (5, NotOccupied), (12, OutOfBox)]
         );
     }

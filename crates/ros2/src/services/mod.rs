@@ -1,4 +1,4 @@
-//! Services: what changes the map is an order to the mapping thread, the others ask views beside it.
+//! Services. Those that change the map are orders to the mapping thread; the others query views concurrently.
 //!
 //! ```text
 //! request -> Transport -> orders -> Mapping -> Outcome

@@ -4,21 +4,20 @@ use crate::publishers::{Extent, octomap};
 use voxtile::octree::OctreeFormat;
 use voxtile::{Aabb, Error};
 
-/// How often an octree is made anew because too much changed meanwhile.
+/// Maximum number of attempts to build an octree while the map changes.
 const ATTEMPTS: usize = 4;
 
-/// The octree that is published, or an empty one: this response cannot say what is wrong.
+/// Returns the published octree. On failure it is empty, because the response has no field for an error.
 pub fn around_sensor(map: &LiveMap, extent: &Extent, format: OctreeFormat, _: Empty) -> OctomapResponse {
     let moment = map.moment();
     let made = make(map, &moment, &extent.around(moment.sensor_m), format);
     let map = made.unwrap_or_else(|error| {
-        log::warn!("an octree that was asked for cannot be made: {error:#}");
+        log::warn!("cannot build a requested octree: {error:#}");
         empty(map, &moment, format)
     });
     OctomapResponse { map }
 }
 
-/// The octree of a box.
 pub fn in_box(map: &LiveMap, request: OctomapInBoxRequest) -> OctomapInBoxResponse {
     let OctomapInBoxRequest { min, max, binary } = request;
     let format = if binary { OctreeFormat::Bt } else { OctreeFormat::Ot };
@@ -35,21 +34,21 @@ pub fn in_box(map: &LiveMap, request: OctomapInBoxRequest) -> OctomapInBoxRespon
     }
 }
 
-/// A tree without nodes, of the kind that was asked for: readers make one of its resolution before they look further.
+/// Returns a tree without nodes. Readers use its type and resolution even if it is empty.
 fn empty(map: &LiveMap, moment: &Moment, format: OctreeFormat) -> Octomap {
     let (binary, resolution) = (format == OctreeFormat::Bt, map.grid().resolution_m());
     Octomap { header: map.header(moment), binary, id: "OcTree".to_owned(), resolution, data: Vec::new() }
 }
 
 fn make(map: &LiveMap, moment: &Moment, region: &Aabb, format: OctreeFormat) -> anyhow::Result<Octomap> {
-    let ask = || octomap(&map.view(), region, format, map.header(moment));
-    let mut made = ask();
+    let attempt = || octomap(&map.view(), region, format, map.header(moment));
+    let mut made = attempt();
     for _ in 1..ATTEMPTS {
         let is_expired = |error: &anyhow::Error| matches!(error.downcast_ref(), Some(Error::Expired));
         if !made.as_ref().is_err_and(is_expired) {
             break;
         }
-        made = ask();
+        made = attempt();
     }
     made
 }
@@ -60,11 +59,11 @@ mod tests {
     use voxtile::{MapConfig, Mapper, OutOfCoreTileMapper, Scan};
 
     #[test]
-    fn an_octree_that_cannot_be_made_is_an_empty_one_of_the_map() {
+    fn a_failed_octree_is_empty_with_the_properties_of_the_map() {
         let folder = tempfile::tempdir().unwrap();
         let config = MapConfig::new(0.1, 10.0).unwrap();
         let mut mapper = OutOfCoreTileMapper::create(folder.path().join("map"), config).unwrap();
-        // Beyond the keys of an octree.
+        // Outside the keys of an octree.
         let origin = [9000.05, 0.05, 0.05];
         let scan = Scan { origin, points: vec![[9001.05, 0.05, 0.05]], intensities: None };
         mapper.insert_scan(&scan).unwrap();

@@ -1,16 +1,16 @@
 use voxtile::{Aabb, SnapshotName};
 
-/// What the mapping thread is asked to do.
+/// Request to the mapping thread.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Order {
-    /// Make durable what is mapped.
+    /// Flush the map.
     Save,
-    /// Forget all voxels.
+    /// Set all voxels to unknown.
     Reset,
-    /// Forget the voxels of a box.
+    /// Set the voxels of a box to unknown.
     Clear(Aabb),
-    /// Keep the map as it is under a name.
+    /// Keep the current map as a snapshot.
     Snapshot(SnapshotName),
-    /// Make the map what it was.
+    /// Revert the map to a snapshot.
     Revert(SnapshotName),
 }

@@ -1,4 +1,4 @@
-/// The middleware of the clients: they mark requests in different ways.
+/// Middleware of the service clients. It determines how requests are identified.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum, serde::Deserialize, serde::Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Rmw {

@@ -7,11 +7,11 @@ use std::sync::Arc;
 use voxtile::SnapshotName;
 use voxtile::octree::OctreeFormat;
 
-/// Makes all services of the node.
+/// Starts all services of the node.
 ///
 /// # Errors
 ///
-/// The transport refuses; lengths that are none.
+/// The transport cannot create a service, or invalid lengths.
 pub fn start(
     args: &Args,
     transport: &mut Transport,
@@ -26,56 +26,56 @@ pub fn start(
             octomaps::around_sensor(&map, &extent, format, request)
         })?;
     }
-    let its_map = map.clone();
+    let live = map.clone();
     transport.serve(
         "~/octomap_in_box",
         TypeName::new("voxtile_msgs", "GetOctomapInBox"),
-        move |request| octomaps::in_box(&its_map, request),
+        move |request| octomaps::in_box(&live, request),
     )?;
-    let its_map = map.clone();
+    let live = map.clone();
     transport.serve("~/cast_ray", TypeName::new("voxtile_msgs", "CastRay"), move |request| {
-        queries::cast_ray(&its_map, request)
+        queries::cast_ray(&live, request)
     })?;
-    let its_map = map.clone();
+    let live = map.clone();
     transport.serve("~/check_collision", TypeName::new("voxtile_msgs", "CheckCollision"), move |request| {
-        queries::check_collision(&its_map, request)
+        queries::check_collision(&live, request)
     })
 }
 
 fn change_the_map(transport: &mut Transport, orders: &Orders) -> anyhow::Result<()> {
-    let its_orders = orders.clone();
+    let queue = orders.clone();
     transport.serve("~/save", TypeName::new("std_srvs", "Trigger"), move |_: Empty| {
-        Outcome::from(its_orders.place(Order::Save))
+        Outcome::from(queue.place(Order::Save))
     })?;
-    // These two responses cannot say what is wrong.
-    let tell = |what: &str, result: Result<String, String>| match result {
+    // The responses of reset and clear_bbox have no field for an error.
+    let log_result = |what: &str, result: Result<String, String>| match result {
         Ok(done) => log::info!("{what}: {done}"),
-        Err(why) => log::warn!("{what}: not done: {why}"),
+        Err(why) => log::warn!("{what}: failed: {why}"),
     };
-    let its_orders = orders.clone();
+    let queue = orders.clone();
     transport.serve("~/reset", TypeName::new("std_srvs", "Empty"), move |_: Empty| {
-        tell("reset", its_orders.place(Order::Reset));
+        log_result("reset", queue.place(Order::Reset));
         Empty::default()
     })?;
-    let its_orders = orders.clone();
+    let queue = orders.clone();
     transport.serve(
         "~/clear_bbox",
         TypeName::new("octomap_msgs", "BoundingBoxQuery"),
         move |request: BoxRequest| {
-            tell("clear_bbox", its_orders.place(Order::Clear(request.region())));
+            log_result("clear_bbox", queue.place(Order::Clear(request.region())));
             Empty::default()
         },
     )?;
     for (name, order) in
         [("~/snapshot", Order::Snapshot as fn(SnapshotName) -> Order), ("~/revert", Order::Revert)]
     {
-        let its_orders = orders.clone();
+        let queue = orders.clone();
         transport.serve(
             name,
             TypeName::new("voxtile_msgs", "Snapshot"),
             move |request: SnapshotRequest| {
                 let name = SnapshotName::new(request.name).map_err(|error| error.to_string());
-                Outcome::from(name.and_then(|name| its_orders.place(order(name))))
+                Outcome::from(name.and_then(|name| queue.place(order(name))))
             },
         )?;
     }

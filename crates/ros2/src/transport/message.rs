@@ -1,15 +1,14 @@
 use std::fmt;
 
-/// What a topic brought.
 #[derive(Clone, Debug)]
 pub struct Message {
-    /// Its bytes, with the four bytes in front that say their encoding.
+    /// CDR bytes with the four-byte encoding header.
     pub cdr: Vec<u8>,
-    /// Who sent it, where the transport knows that.
+    /// Publisher of the message, if the transport provides it.
     pub publisher: Option<Gid>,
 }
 
-/// The number of a publisher, as `ros2 topic info --verbose` prints it.
+/// Identifier of a publisher, as printed by `ros2 topic info --verbose`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Gid(pub [u8; 16]);
 

@@ -1,7 +1,7 @@
-//! How the node talks to others: over DDS, or over Zenoh as `rmw_zenoh_cpp` does. Nothing else knows which of the two.
+//! Transport of messages: DDS, or Zenoh compatible with `rmw_zenoh_cpp`. Other modules do not depend on the choice.
 //!
 //! ```text
-//! Transport: subscribe (bytes of CDR come), advertise -> Sender, serve (requests to responses)
+//! Transport: subscribe (receives CDR bytes), advertise -> Sender, serve (requests to responses)
 //! dds: rustdds, ros2-client      zenoh: a session, keys and tokens of rmw_zenoh
 //! ```
 
@@ -23,5 +23,5 @@ pub use transport_name::TransportName;
 pub use transport_node::Transport;
 pub use type_name::TypeName;
 
-/// Takes a message.
+/// Callback for received messages.
 pub type Put = Box<dyn Fn(Message) + Send>;

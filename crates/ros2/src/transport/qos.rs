@@ -1,11 +1,11 @@
-/// How samples of a topic are kept and sent. Always the last ones.
+/// Quality of service of a topic. The history is always keep-last.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Qos {
-    /// Reliable, or best effort.
+    /// Reliable if true, otherwise best effort.
     pub is_reliable: bool,
-    /// Transient local: who comes late gets the last ones too. Otherwise volatile.
+    /// Transient local if true: late subscribers get the last messages. Otherwise volatile.
     pub is_latched: bool,
-    /// How many are kept.
+    /// Number of messages kept.
     pub depth: usize,
 }
 

@@ -3,7 +3,7 @@ use super::dds::DdsSender;
 use super::zenoh::ZenohSender;
 use serde::Serialize;
 
-/// One end of a topic that the node publishes.
+/// Publisher of a topic.
 pub enum Sender<M: Serialize> {
     Dds(DdsSender<M>),
     #[cfg(feature = "zenoh")]
@@ -11,20 +11,19 @@ pub enum Sender<M: Serialize> {
 }
 
 impl<M: Serialize> Sender<M> {
-    /// How many listen.
-    pub fn listeners(&self) -> usize {
+    pub fn subscribers(&self) -> usize {
         match self {
-            Self::Dds(sender) => sender.listeners(),
+            Self::Dds(sender) => sender.subscribers(),
             #[cfg(feature = "zenoh")]
-            Self::Zenoh(sender) => sender.listeners(),
+            Self::Zenoh(sender) => sender.subscribers(),
         }
     }
 
-    /// Sends a message to all who listen.
+    /// Sends a message to all subscribers.
     ///
     /// # Errors
     ///
-    /// It was not sent.
+    /// The message was not sent.
     pub fn send(&self, message: M) -> anyhow::Result<()> {
         match self {
             Self::Dds(sender) => sender.send(message),

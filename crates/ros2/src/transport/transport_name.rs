@@ -1,9 +1,8 @@
-/// What carries messages.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum, serde::Deserialize, serde::Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum TransportName {
-    /// DDS, as Fast DDS and Cyclone DDS speak it.
+    /// DDS, compatible with Fast DDS and Cyclone DDS.
     Dds,
-    /// Zenoh, as `rmw_zenoh_cpp` speaks it (Jazzy and later).
+    /// Zenoh, compatible with `rmw_zenoh_cpp` (Jazzy and later).
     Zenoh,
 }

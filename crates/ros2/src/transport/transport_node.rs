@@ -8,7 +8,7 @@ use ros2_client::Message;
 use serde::Serialize;
 use std::sync::Arc;
 
-/// The node among others. Topics and services have the names that the node itself uses: remapping is done here.
+/// The node in the ROS graph. Its methods take names before remapping.
 pub enum Transport {
     Dds(DdsNode),
     #[cfg(feature = "zenoh")]
@@ -16,11 +16,11 @@ pub enum Transport {
 }
 
 impl Transport {
-    /// Joins the others; what does not arrive whole is counted in the inbox.
+    /// Joins the ROS graph. Messages that arrive incomplete are counted in the inbox.
     ///
     /// # Errors
     ///
-    /// No sockets; names that ROS 2 does not know; a transport that this program was built without.
+    /// No sockets, invalid names, or a transport that this program was built without.
     pub fn join(args: &Args, inbox: &Arc<Inbox>) -> anyhow::Result<Self> {
         match args.transport {
             TransportName::Dds => Ok(Self::Dds(DdsNode::join(args, inbox)?)),
@@ -28,7 +28,7 @@ impl Transport {
             TransportName::Zenoh => Ok(Self::Zenoh(ZenohNode::join(args, inbox)?)),
             #[cfg(not(feature = "zenoh"))]
             TransportName::Zenoh => anyhow::bail!(
-                "--transport zenoh: this program was built without it; build it with --features zenoh"
+                "--transport zenoh: this program was built without Zenoh; rebuild it with --features zenoh"
             ),
         }
     }
@@ -37,7 +37,7 @@ impl Transport {
     ///
     /// # Errors
     ///
-    /// A name that is none; the transport refuses.
+    /// An invalid name, or a transport that cannot create the subscription.
     pub fn subscribe(&mut self, topic: &str, kind: TypeName, qos: Qos, put: Put) -> anyhow::Result<()> {
         match self {
             Self::Dds(node) => node.subscribe(topic, kind, qos, put),
@@ -46,11 +46,11 @@ impl Transport {
         }
     }
 
-    /// Offers a topic.
+    /// Creates a publisher.
     ///
     /// # Errors
     ///
-    /// A name that is none; the transport refuses.
+    /// An invalid name, or a transport that cannot create the publisher.
     pub fn advertise<M: Serialize>(
         &mut self,
         topic: &str,
@@ -64,11 +64,11 @@ impl Transport {
         }
     }
 
-    /// Answers a service in a thread of its own, one request after the other.
+    /// Serves requests in a thread of their own, one after the other.
     ///
     /// # Errors
     ///
-    /// A name that is none; the transport refuses.
+    /// An invalid name, or a transport that cannot create the service.
     pub fn serve<Q, A>(
         &mut self,
         service: &str,
@@ -86,7 +86,6 @@ impl Transport {
         }
     }
 
-    /// Leaves the others.
     pub fn leave(self) {
         match self {
             Self::Dds(_) => {}

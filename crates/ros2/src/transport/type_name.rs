@@ -1,6 +1,6 @@
 use std::fmt;
 
-/// The type of a message or of a service: `sensor_msgs` and `PointCloud2`.
+/// Type of a message or service, such as `sensor_msgs` and `PointCloud2`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct TypeName {
     pub package: &'static str,
@@ -12,12 +12,12 @@ impl TypeName {
         Self { package, name }
     }
 
-    /// The type of a message as DDS has it.
+    /// Returns the DDS name of a message type.
     pub fn of_message(&self) -> String {
         format!("{}::msg::dds_::{}_", self.package, self.name)
     }
 
-    /// The type of a service as DDS has it, where it ends in `Request_` and `Response_`.
+    /// Returns the DDS name of a service type, to which DDS appends `Request_` or `Response_`.
     pub fn of_service(&self) -> String {
         format!("{}::srv::dds_::{}_", self.package, self.name)
     }

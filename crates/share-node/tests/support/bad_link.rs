@@ -1,4 +1,4 @@
-//! A link that loses, repeats, delays and reorders what goes through it, or is cut for a time.
+//! Link that loses, repeats, delays and reorders packets, or is cut for a time.
 
 use std::sync::mpsc::{SyncSender, sync_channel};
 use std::thread;
@@ -10,13 +10,13 @@ use zenoh::{Config, Session, Wait};
 /// Key and bytes as one packet.
 type Packet = Vec<u8>;
 
-/// What the link does to packets; a zero is a fault that it does not have.
+/// Faults of the link. Zero disables a fault.
 #[derive(Clone, Copy)]
 pub struct BadLink {
     pub seed: u64,
-    /// Part of the packets that is lost.
+    /// Fraction of lost packets.
     pub loss: f64,
-    /// Part of the packets that come twice.
+    /// Fraction of repeated packets.
     pub repetition: f64,
     pub max_delay: Duration,
     pub cut_from: Duration,
@@ -24,8 +24,8 @@ pub struct BadLink {
 }
 
 impl BadLink {
-    /// Carries packets between robots that listen and subscribers that connect to `listen`, on a thread that ends with
-    /// the process.
+    /// Carries packets between the endpoints of the robots and subscribers that connect to `listen`, in a thread that
+    /// ends with the process.
     pub fn start(self, listen: &str, robots: &[&str]) {
         let to_subscribers = open("listen", &[listen]);
         let to_robots = open("connect", robots);
@@ -77,7 +77,7 @@ fn open(how: &str, endpoints: &[&str]) -> Session {
 fn subscribe(session: &Session, keys: &str, to: SyncSender<Packet>) -> Subscriber<()> {
     let take = move |sample: zenoh::sample::Sample| {
         let key = sample.key_expr().as_str();
-        // What does not fit is lost, as on any link.
+        // Drop packets if the queue is full.
         let _ = to.try_send([&[key.len() as u8], key.as_bytes(), &sample.payload().to_bytes()].concat());
     };
     session.declare_subscriber(keys).callback(take).wait().unwrap()

@@ -1,4 +1,4 @@
-//! Real processes, and what they say.
+//! Processes under test and their output.
 #![allow(dead_code)]
 
 pub mod bad_link;
@@ -14,7 +14,7 @@ use voxtile_simulation::Survey;
 
 pub const SHARE: &str = env!("CARGO_BIN_EXE_voxtile-share");
 
-/// Ends with its test.
+/// Process that is killed when dropped.
 pub struct Process(pub Child);
 
 impl Process {
@@ -25,7 +25,7 @@ impl Process {
 
 impl Drop for Process {
     fn drop(&mut self) {
-        // It may have ended by itself.
+        // It may have exited already.
         let _ = self.0.kill();
         let _ = self.0.wait();
     }
@@ -37,19 +37,19 @@ pub fn start(program: &str, args: &[&str]) -> Process {
     Process(command.spawn().unwrap())
 }
 
-/// Asks a process to end.
+/// Sends SIGTERM to a process.
 pub fn stop(process: &Process) {
     let status = Command::new("kill").args(["-TERM", &process.id().to_string()]).status();
     assert!(status.unwrap().success());
 }
 
-/// An endpoint that nobody listens at yet.
+/// Returns an endpoint with a free port.
 pub fn endpoint() -> String {
     let port = TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port();
     format!("tcp/127.0.0.1:{port}")
 }
 
-/// Some scans of a made-up street.
+/// Writes scans of a synthetic street.
 pub fn scans(folder: &Path, seed: u64, count: usize) -> PathBuf {
     let path = folder.join(format!("{seed}.scans"));
     let mut writer = ScanStreamWriter::new(std::fs::File::create(&path).unwrap(), "street", false).unwrap();
@@ -67,7 +67,7 @@ pub fn publisher(robot: &str, scans: &Path, endpoint: &str) -> Process {
     start(SHARE, &[&args[..], &["--resolution", "0.2", "--json"]].concat())
 }
 
-/// Voxels and digest of the set, once all scans are mapped.
+/// Returns the size and digest of the set after all scans are mapped.
 pub fn set_of(publisher: &mut Process) -> (u64, String) {
     let mut line = String::new();
     BufReader::new(publisher.0.stdout.as_mut().unwrap()).read_line(&mut line).unwrap();
@@ -82,17 +82,17 @@ pub fn subscriber(map: &Path, endpoints: &[&str], more: &[&str]) -> Process {
     start(SHARE, &args)
 }
 
-/// Robot, voxels, digest and whether it is equal, of a layer.
+/// Robot, number of voxels, digest and whether the layer equals the robot's set.
 pub type Layer = (String, u64, String, bool);
 
-/// Each layer of a subscriber that ends well.
+/// Returns the layers of a subscriber that must succeed.
 pub fn layers_of(subscriber: &mut Process) -> Vec<Layer> {
     let (layers, is_success) = layers_and_success(subscriber);
     assert!(is_success);
     layers
 }
 
-/// Each layer of a subscriber, and whether it ends well.
+/// Returns the layers of a subscriber and whether it succeeds.
 pub fn layers_and_success(subscriber: &mut Process) -> (Vec<Layer>, bool) {
     let (summaries, is_success) = summaries_and_success(subscriber);
     let layer = |summary: &Value| {
@@ -103,7 +103,7 @@ pub fn layers_and_success(subscriber: &mut Process) -> (Vec<Layer>, bool) {
     (summaries.iter().map(layer).collect(), is_success)
 }
 
-/// All that a subscriber says of each layer in the end, and whether it ends well; if not, the last line is the error.
+/// Returns the summaries of a subscriber and whether it succeeds. On failure the last line is the error.
 pub fn summaries_and_success(subscriber: &mut Process) -> (Vec<Value>, bool) {
     let mut out = String::new();
     subscriber.0.stdout.as_mut().unwrap().read_to_string(&mut out).unwrap();

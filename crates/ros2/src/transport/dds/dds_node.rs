@@ -20,7 +20,6 @@ use serde::Serialize;
 use std::net::{IpAddr, Ipv4Addr};
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// A node of a DDS domain.
 pub struct DdsNode {
     participant: DomainParticipant,
     subscriber: Subscriber,
@@ -28,12 +27,12 @@ pub struct DdsNode {
     names: Names,
     rmw: Rmw,
     inbox: Arc<Inbox>,
-    /// What keeps the node in the graph.
+    /// Keeps the node in the graph.
     _context: Context,
 }
 
 const RECEIVE_BUFFER_BYTES: usize = 8 << 20;
-/// Below this most fragments of a large cloud are lost.
+/// With a smaller buffer most fragments of a large cloud are lost.
 const MIN_RECEIVE_BUFFER_BYTES: usize = 2 << 20;
 
 impl DdsNode {
@@ -41,7 +40,7 @@ impl DdsNode {
     ///
     /// # Errors
     ///
-    /// No sockets; names that ROS 2 does not know.
+    /// No sockets, or invalid names.
     pub fn join(args: &Args, inbox: &Arc<Inbox>) -> anyhow::Result<Self> {
         let mut builder =
             DomainParticipantBuilder::new(args.domain_id).socket_receive_buffer_size(RECEIVE_BUFFER_BYTES);
@@ -74,7 +73,7 @@ impl DdsNode {
     }
 
     pub fn subscribe(&self, topic: &str, kind: TypeName, qos: Qos, put: Put) -> anyhow::Result<()> {
-        // As ROS 2 names topics in DDS.
+        // ROS 2 prefixes topic names with `rt` in DDS.
         let name = self.names.of(topic).map(|_| format!("rt{}", self.names.full(topic)))?;
         let qos = policies(qos);
         let topic = self
@@ -94,7 +93,7 @@ impl DdsNode {
                         put(transport::Message { cdr: sample.into_value().cdr, publisher });
                     }
                     Err(error) => {
-                        log::debug!("a sample is lost: {error:?}");
+                        log::debug!("message lost: {error:?}");
                         inbox.count(|counters| counters.transport_errors += 1);
                     }
                 }
@@ -136,19 +135,19 @@ impl DdsNode {
     }
 }
 
-/// Says what to do where the system gives sockets too little room: it cuts what is asked for without a word.
+/// Warns if the system limits socket buffers too much: it silently reduces the requested size.
 fn check_receive_buffer() {
-    let most = std::fs::read_to_string("/proc/sys/net/core/rmem_max");
-    let Some(most) = most.ok().and_then(|text| text.trim().parse::<usize>().ok()) else { return };
-    if most < MIN_RECEIVE_BUFFER_BYTES {
+    let max_bytes = std::fs::read_to_string("/proc/sys/net/core/rmem_max");
+    let Some(max_bytes) = max_bytes.ok().and_then(|text| text.trim().parse::<usize>().ok()) else { return };
+    if max_bytes < MIN_RECEIVE_BUFFER_BYTES {
         log::warn!(
-            "the system gives sockets {most} bytes, too few for large clouds, most of which will be lost: \
+            "socket buffers are limited to {max_bytes} bytes, so most large clouds will be lost; raise the limit: \
              sysctl net.core.rmem_max={RECEIVE_BUFFER_BYTES}"
         );
     }
 }
 
-/// Of a reader.
+/// Returns the policies of a reader.
 fn policies(qos: Qos) -> QosPolicies {
     let reliability = match qos.is_reliable {
         true => Reliability::Reliable { max_blocking_time: rustdds::Duration::from_millis(100) },
@@ -163,7 +162,7 @@ fn policies(qos: Qos) -> QosPolicies {
         .build()
 }
 
-/// Of a publisher.
+/// Returns the profile of a publisher.
 fn profile(qos: Qos) -> QosProfile {
     use ros2_client::qos::{Durability, History};
     let mut profile = QosProfile::publisher_default().history(History::KeepLast { depth: qos.depth });

@@ -1,6 +1,6 @@
 use serde::{Deserialize, Serialize};
 
-/// A request or a response as Cyclone DDS marks it: who asks, and the number of the question.
+/// Request or response in Cyclone DDS: the body follows the client's GUID and the sequence number.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Marked<T> {
     pub guid: u64,

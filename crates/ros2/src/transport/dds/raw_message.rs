@@ -2,14 +2,13 @@ use rustdds::RepresentationIdentifier;
 use rustdds::no_key::{Decode, DefaultDecoder, DeserializerAdapter};
 use std::convert::Infallible;
 
-/// A message as its bytes, with the four bytes in front that say its encoding: as recordings keep it, so that one
-/// decoder reads both.
+/// Message as CDR bytes with the four-byte encoding header, as in recordings. The same decoder reads both.
 #[derive(Clone, Debug)]
 pub struct RawMessage {
     pub cdr: Vec<u8>,
 }
 
-/// Decodes nothing: lengths that lie are the decoder's business.
+/// Adapter that copies the bytes. Lengths in them are validated by the decoder.
 #[derive(Clone, Copy, Debug)]
 pub struct RawAdapter;
 

@@ -10,7 +10,7 @@ use ros2_client::qos::{History, QosProfile};
 use ros2_client::{Message, Name, Node, ServiceMapping, ServiceTypeName};
 use rustdds::{DomainParticipant, QosPolicies, Topic, TopicKind};
 
-/// Makes services of a node, each with a thread of its own.
+/// Creates the services of a node, each with a thread of its own.
 pub struct Servers<'a> {
     pub participant: &'a DomainParticipant,
     pub node: &'a mut Node,
@@ -18,15 +18,15 @@ pub struct Servers<'a> {
     pub rmw: Rmw,
 }
 
-/// Requests that DDS keeps for a service that is busy.
+/// Number of requests that DDS queues for a busy service.
 const DEPTH: usize = 10;
 
 impl Servers<'_> {
-    /// Answers a service, one request after the other. A name that begins with `~` is one of the node's own.
+    /// Serves requests one after the other. A name that begins with `~` is below the node's name.
     ///
     /// # Errors
     ///
-    /// DDS refuses, or the system a thread.
+    /// DDS cannot create the service, or the system cannot create a thread.
     pub fn serve<Q, A>(
         &mut self,
         name: &str,
@@ -44,7 +44,7 @@ impl Servers<'_> {
         }
     }
 
-    /// For clients of which requests are known by what DDS says about them.
+    /// Serves clients whose requests are identified by DDS sample identities.
     fn serve_enhanced<Q, A>(
         &mut self,
         path: &Name,
@@ -67,10 +67,10 @@ impl Servers<'_> {
                 match request {
                     Ok((id, request)) => {
                         if let Err(error) = server.send_response(id, answer(request)) {
-                            log::warn!("{label}: not answered: {error:?}");
+                            log::warn!("{label}: cannot send the response: {error:?}");
                         }
                     }
-                    Err(error) => log::debug!("{label}: a request cannot be read: {error:?}"),
+                    Err(error) => log::debug!("{label}: cannot read a request: {error:?}"),
                 }
                 futures::future::ready(())
             }));
@@ -78,8 +78,8 @@ impl Servers<'_> {
         Ok(())
     }
 
-    /// For clients that mark the messages themselves. Not by `create_server`: it marks them in both ways, and then
-    /// responses of more than 64 KB arrive as garbage.
+    /// Serves clients that put the identity into the message. Does not use `create_server`, which adds both identities:
+    /// responses of more than 64 KB then arrive corrupted.
     fn serve_marked<Q, A>(
         &mut self,
         path: &str,
@@ -105,10 +105,10 @@ impl Servers<'_> {
                     Ok((Marked { guid, number, body }, _)) => {
                         let response = Marked { guid, number, body: answer(body) };
                         if let Err(error) = writer.publish(response) {
-                            log::warn!("{label}: not answered: {error}");
+                            log::warn!("{label}: cannot send the response: {error}");
                         }
                     }
-                    Err(error) => log::debug!("{label}: a request cannot be read: {error:?}"),
+                    Err(error) => log::debug!("{label}: cannot read a request: {error:?}"),
                 }
                 futures::future::ready(())
             }));

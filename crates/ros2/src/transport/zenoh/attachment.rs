@@ -1,21 +1,20 @@
 use std::time::{SystemTime, UNIX_EPOCH};
 
-/// What goes with each sample, request and response: whose it is, and its number.
+/// Attachment of each message, request and response: sender and sequence number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Attachment {
-    /// Of its sender, from 1 on.
+    /// Sequence number of the sender, starting at 1.
     pub number: i64,
     pub sent_at_ns: i64,
-    /// Of its sender.
+    /// GID of the sender.
     pub gid: [u8; GID_BYTES],
 }
 
 pub const GID_BYTES: usize = 16;
-/// Of every attachment.
+/// Size of an encoded attachment.
 pub const BYTES: usize = 8 + 8 + 1 + GID_BYTES;
 
 impl Attachment {
-    /// One of this moment.
     pub fn now(number: i64, gid: [u8; GID_BYTES]) -> Self {
         let since = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
         Self { number, sent_at_ns: i64::try_from(since.as_nanos()).unwrap_or(i64::MAX), gid }
@@ -30,7 +29,7 @@ impl Attachment {
         bytes
     }
 
-    /// None if these are not its bytes.
+    /// Returns `None` for bytes that are not an attachment.
     pub fn from_bytes(bytes: &[u8]) -> Option<Self> {
         let bytes: &[u8; BYTES] = bytes.try_into().ok()?;
         let number = i64::from_le_bytes(bytes[..8].try_into().ok()?);
@@ -45,15 +44,15 @@ mod tests {
     use super::*;
 
     #[test]
-    fn other_bytes_are_no_attachment() {
+    fn invalid_attachments_are_refused() {
         let attachment = Attachment { number: 7, sent_at_ns: -2, gid: [9; GID_BYTES] };
         let bytes = attachment.to_bytes();
         assert_eq!(Attachment::from_bytes(&bytes), Some(attachment));
         let mut longer = bytes.to_vec();
         longer.push(0);
-        let mut lying = bytes;
-        lying[16] = 255;
-        for wrong in [&[][..], &bytes[..32], &longer, &lying] {
+        let mut invalid = bytes;
+        invalid[16] = 255;
+        for wrong in [&[][..], &bytes[..32], &longer, &invalid] {
             assert_eq!(Attachment::from_bytes(wrong), None);
         }
     }

@@ -3,14 +3,16 @@ use anyhow::anyhow;
 use serde_json::{Value, json};
 use zenoh::Config;
 
-/// Beyond the largest message that is kept: what is larger than that can be counted, and not only lost.
-const ROOM_BYTES: usize = 8 << 20;
+/// Margin above the largest accepted message. Messages within it are received and counted as too large; Zenoh drops
+/// larger ones.
+const EXTRA_BYTES: usize = 8 << 20;
 
-/// As a session of `rmw_zenoh_cpp` is configured: a peer that others know from a router, without multicast.
+/// Returns the configuration of a session in `rmw_zenoh_cpp`: a peer that is discovered through a router, without
+/// multicast.
 ///
 /// # Errors
 ///
-/// A file that is no configuration; an endpoint that is none.
+/// An invalid configuration file or endpoint.
 pub fn configuration(args: &Args) -> anyhow::Result<Config> {
     if let Some(path) = &args.zenoh_config {
         return Config::from_file(path)
@@ -23,13 +25,15 @@ pub fn configuration(args: &Args) -> anyhow::Result<Config> {
         ("listen/endpoints", json!([listen])),
         ("scouting/multicast/enabled", json!(false)),
         ("timestamping/enabled", json!(true)),
-        ("transport/link/rx/max_message_size", json!(args.queue_bytes().saturating_add(ROOM_BYTES))),
+        ("transport/link/rx/max_message_size", json!(args.queue_bytes().saturating_add(EXTRA_BYTES))),
     ];
     let mut config = Config::default();
     for (key, value) in settings {
         config.insert_json5(key, &value.to_string()).map_err(|error| {
             let routers = args.zenoh_router.join(" ");
-            anyhow!("--zenoh-router {routers}: {key}: {error}; one looks like tcp/localhost:7447")
+            anyhow!(
+                "--zenoh-router {routers}: {key}: {error}; expected an endpoint such as tcp/localhost:7447"
+            )
         })?;
     }
     Ok(config)

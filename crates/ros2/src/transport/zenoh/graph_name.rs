@@ -5,17 +5,17 @@ use crate::transport::{Qos, TypeName};
 use anyhow::anyhow;
 use twox_hash::XxHash3_128;
 
-/// The node's name in keys and tokens, which are those of `rmw_zenoh_cpp`.
+/// Name of the node in keys and tokens of `rmw_zenoh_cpp`.
 #[derive(Clone, Debug)]
 pub struct GraphName {
     pub domain_id: u16,
-    /// Of the session.
+    /// Zenoh ID of the session.
     pub zenoh_id: String,
     pub namespace: String,
     pub node_name: String,
 }
 
-/// One end of a topic or of a service.
+/// Kind of an endpoint.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum End {
     Publisher,
@@ -23,42 +23,42 @@ pub enum End {
     Service,
 }
 
-/// A topic or a service with its type.
+/// Topic or service with its type.
 #[derive(Clone, Debug)]
 pub struct Channel {
-    /// From the root on.
+    /// Absolute name.
     pub name: String,
-    /// As DDS has it.
+    /// DDS name of the type.
     pub type_name: String,
     pub type_hash: &'static str,
 }
 
 const SPACE: &str = "@ros2_lv";
-/// For an enclave, of which there is none.
+/// Placeholder for the empty enclave.
 const NONE: &str = "%";
 
 impl Channel {
     /// # Errors
     ///
-    /// A name that is none in ROS 2; a type whose hash is not known.
+    /// An invalid name in ROS 2, or a type without a known hash.
     pub fn topic(names: &Names, topic: &str, kind: TypeName) -> anyhow::Result<Self> {
         Self::new(names, topic, kind, kind.of_message())
     }
 
     /// # Errors
     ///
-    /// A name that is none in ROS 2; a type whose hash is not known.
+    /// An invalid name in ROS 2, or a type without a known hash.
     pub fn service(names: &Names, service: &str, kind: TypeName) -> anyhow::Result<Self> {
         Self::new(names, service, kind, kind.of_service())
     }
 
     fn new(names: &Names, name: &str, kind: TypeName, type_name: String) -> anyhow::Result<Self> {
         names.of(name)?;
-        let type_hash = type_hash(kind).ok_or_else(|| anyhow!("{name}: the hash of {kind} is not known"))?;
+        let type_hash = type_hash(kind).ok_or_else(|| anyhow!("{name}: no known hash of the type {kind}"))?;
         Ok(Self { name: names.full(name), type_name, type_hash })
     }
 
-    /// The key of samples and of queries.
+    /// Returns the key of messages and queries.
     pub fn key(&self, domain_id: u16) -> String {
         let Self { name, type_name, type_hash } = self;
         format!("{domain_id}/{}/{type_name}/{type_hash}", name.trim_start_matches('/'))
@@ -66,12 +66,11 @@ impl Channel {
 }
 
 impl GraphName {
-    /// The token of the node itself, which is entity 0.
+    /// Returns the token of the node itself, which is entity 0.
     pub fn token(&self) -> String {
         format!("{}/0/NN/{}", self.start(), self.end())
     }
 
-    /// The token of one of its ends.
     pub fn token_of(&self, entity: usize, end: End, channel: &Channel, qos: Qos) -> String {
         let end = match end {
             End::Publisher => "MP",
@@ -84,7 +83,7 @@ impl GraphName {
         format!("{start}/{entity}/{end}/{node}/{name}/{type_name}/{type_hash}/{qos}")
     }
 
-    /// Matches the tokens of all subscriptions of a topic.
+    /// Returns a pattern for the tokens of all subscriptions of a topic.
     pub fn subscriptions(&self, channel: &Channel) -> String {
         let Channel { name, type_name, type_hash } = channel;
         let name = mangled(name);
@@ -100,7 +99,7 @@ impl GraphName {
     }
 }
 
-/// What others know the sender of a sample by.
+/// Returns the GID that `rmw_zenoh_cpp` derives from the token of an endpoint.
 pub fn gid_of(token: &str) -> [u8; GID_BYTES] {
     XxHash3_128::oneshot(token.as_bytes()).to_le_bytes()
 }
@@ -109,7 +108,7 @@ fn mangled(name: &str) -> String {
     name.replace('/', "%")
 }
 
-/// Reliability, durability, history; nothing for what is the default there.
+/// Encodes reliability, durability and history; default values are empty.
 fn qos_of(qos: Qos) -> String {
     let reliability = if qos.is_reliable { "" } else { "2" };
     let durability = if qos.is_latched { "1" } else { "" };

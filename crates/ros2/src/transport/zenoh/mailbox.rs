@@ -1,13 +1,14 @@
 use std::collections::VecDeque;
 use std::sync::{Arc, Condvar, Mutex, PoisonError};
 
-/// What came and waits for its thread: so many of so many bytes, and the oldest go first. Zenoh's threads never wait.
+/// Queue of received messages for one thread, bounded in number and bytes. When it is full, the oldest are dropped:
+/// Zenoh's threads never wait.
 #[derive(Debug)]
 pub struct Mailbox<T> {
     state: Mutex<State<T>>,
     changed: Condvar,
-    most: usize,
-    most_bytes: usize,
+    max_count: usize,
+    max_bytes: usize,
 }
 
 #[derive(Debug)]
@@ -18,27 +19,32 @@ struct State<T> {
 }
 
 impl<T> Mailbox<T> {
-    pub fn new(most: usize, most_bytes: usize) -> Arc<Self> {
+    pub fn new(max_count: usize, max_bytes: usize) -> Arc<Self> {
         let state = State { waiting: VecDeque::new(), bytes: 0, is_closed: false };
-        Arc::new(Self { state: Mutex::new(state), changed: Condvar::new(), most: most.max(1), most_bytes })
+        Arc::new(Self {
+            state: Mutex::new(state),
+            changed: Condvar::new(),
+            max_count: max_count.max(1),
+            max_bytes,
+        })
     }
 
-    /// Puts one of so many bytes in and returns how many others had to go; it must fit alone.
+    /// Adds an item and returns the number of dropped items. `bytes` must not exceed the limit.
     pub fn put(&self, one: T, bytes: usize) -> usize {
         let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
-        let mut gone = 0;
-        while state.waiting.len() >= self.most || state.bytes.saturating_add(bytes) > self.most_bytes {
-            let Some((_, its_bytes)) = state.waiting.pop_front() else { break };
-            state.bytes -= its_bytes;
-            gone += 1;
+        let mut dropped = 0;
+        while state.waiting.len() >= self.max_count || state.bytes.saturating_add(bytes) > self.max_bytes {
+            let Some((_, oldest_bytes)) = state.waiting.pop_front() else { break };
+            state.bytes -= oldest_bytes;
+            dropped += 1;
         }
         state.bytes += bytes;
         state.waiting.push_back((one, bytes));
         self.changed.notify_one();
-        gone
+        dropped
     }
 
-    /// Waits for the next one; none after it was closed.
+    /// Waits for the next item. Returns `None` after the mailbox is closed.
     pub fn take(&self) -> Option<T> {
         let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
         loop {
@@ -53,7 +59,7 @@ impl<T> Mailbox<T> {
         }
     }
 
-    /// Ends the thread that takes.
+    /// Closes the mailbox, which ends the thread that reads it.
     pub fn close(&self) {
         self.state.lock().unwrap_or_else(PoisonError::into_inner).is_closed = true;
         self.changed.notify_all();
@@ -65,7 +71,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn it_is_bounded_in_number_and_bytes() {
+    fn the_mailbox_is_bounded_in_number_and_bytes() {
         let mailbox = Mailbox::new(3, 100);
         assert_eq!((1..=5).map(|n| mailbox.put(n, 10)).collect::<Vec<_>>(), [0, 0, 0, 1, 1]);
         assert_eq!(mailbox.put(6, 85), 2);

@@ -1,18 +1,18 @@
-//! Zenoh, as `rmw_zenoh_cpp` uses it: one session, a key for each topic and service, a liveliness token for the node
-//! and each of its ends, by which others know the graph.
+//! Zenoh as used by `rmw_zenoh_cpp`: one session, a key for each topic and service, and a liveliness token for the node
+//! and each of its endpoints, from which other nodes derive the graph.
 //!
 //! ```text
 //! sample, query -> Mailbox (bounded) -> a thread of its own -> CDR -> node
-//! node -> CDR and attachment -> ZenohSender -> listeners: tokens of subscriptions
+//! node -> CDR and attachment -> ZenohSender -> Subscribers: tokens of subscriptions
 //! ```
 
 mod attachment;
 mod cdr;
 mod configuration;
 mod graph_name;
-mod listeners;
 mod mailbox;
 mod service;
+mod subscribers;
 mod type_hash;
 mod zenoh_node;
 mod zenoh_sender;

@@ -6,8 +6,8 @@ use zenoh::Wait as _;
 use zenoh::key_expr::KeyExpr;
 use zenoh::query::Query;
 
-/// What a request takes while it waits, all of it. `None` if its attachment is none of `rmw_zenoh`: such a one is of any
-/// size.
+/// Returns the memory of a queued request. Returns `None` if its attachment is not one of `rmw_zenoh_cpp`, because it
+/// may have any size.
 pub fn waiting_bytes(query: &Query) -> Option<usize> {
     let attachment = query.attachment().map_or(0, |attachment| attachment.len());
     let is_ours = attachment == 0 || attachment == ATTACHMENT_BYTES;
@@ -15,17 +15,17 @@ pub fn waiting_bytes(query: &Query) -> Option<usize> {
     is_ours.then(|| payload.saturating_add(attachment).saturating_add(query.parameters().as_str().len()))
 }
 
-/// Answers a request, and tells who asks in a wrong way what is wrong.
+/// Answers a request. An invalid request gets an error response.
 pub fn respond<Q: DeserializeOwned, A: Serialize>(query: &Query, key: &KeyExpr<'_>, answer: impl Fn(Q) -> A) {
     let replied = match response(query, answer) {
         Ok((bytes, attachment)) => query.reply(key, bytes).attachment(attachment.to_bytes()).wait(),
         Err(error) => {
-            log::debug!("{key}: a request cannot be read: {error:#}");
+            log::debug!("{key}: cannot read a request: {error:#}");
             query.reply_err(format!("{error:#}")).wait()
         }
     };
     if let Err(error) = replied {
-        log::warn!("{key}: not answered: {error}");
+        log::warn!("{key}: cannot send the response: {error}");
     }
 }
 
@@ -34,13 +34,13 @@ fn response<Q: DeserializeOwned, A: Serialize>(
     answer: impl Fn(Q) -> A,
 ) -> anyhow::Result<(Vec<u8>, Attachment)> {
     let attachment = query.attachment().map(|bytes| bytes.to_bytes());
-    let asked = attachment.and_then(|bytes| Attachment::from_bytes(&bytes));
-    let asked = asked.ok_or_else(|| anyhow!("a request needs the attachment of rmw_zenoh"))?;
-    let payload = query.payload().ok_or_else(|| anyhow!("a request needs a payload"))?;
+    let request_id = attachment.and_then(|bytes| Attachment::from_bytes(&bytes));
+    let request_id = request_id.ok_or_else(|| anyhow!("the request has no rmw_zenoh_cpp attachment"))?;
+    let payload = query.payload().ok_or_else(|| anyhow!("the request has no payload"))?;
     let request = cdr::decode(&payload.to_bytes()).context("the request")?;
-    // The response has the number and the gid of the request.
+    // The response repeats the number and the GID of the request.
     let bytes = cdr::encode(&answer(request))?;
-    Ok((bytes, Attachment::now(asked.number, asked.gid)))
+    Ok((bytes, Attachment::now(request_id.number, request_id.gid)))
 }
 
 #[cfg(test)]
@@ -50,7 +50,7 @@ mod tests {
     use std::time::Duration;
     use zenoh::Config;
 
-    /// What requests take, sent to a node in the same process.
+    /// Returns the memory of requests that were sent to a service in the same process.
     fn bytes_of(requests: &[(&str, usize, Option<usize>)]) -> Vec<Option<usize>> {
         let mut config = Config::default();
         for (key, value) in [("scouting/multicast/enabled", "false"), ("listen/endpoints", "[]")] {

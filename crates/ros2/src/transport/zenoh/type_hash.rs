@@ -1,11 +1,11 @@
 use crate::transport::TypeName;
 
-/// The hash of a type (REP 2011), which is part of keys; none of a type that the node does not use.
+/// Returns the hash of a type (REP 2011), which is part of keys; `None` for a type that the node does not use.
 pub fn type_hash(kind: TypeName) -> Option<&'static str> {
     HASHES.iter().find(|(known, _)| *known == kind).map(|(_, hash)| *hash)
 }
 
-/// `tests/type_hashes.py` computes them again from the definitions.
+/// Checked by `tests/type_hashes.py`, which computes the hashes from the definitions.
 const HASHES: [(TypeName, &str); 16] = [
     (
         TypeName::new("sensor_msgs", "PointCloud2"),

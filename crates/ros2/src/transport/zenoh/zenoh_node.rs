@@ -1,9 +1,9 @@
 use super::attachment::Attachment;
 use super::configuration::configuration;
 use super::graph_name::{Channel, End, GraphName, gid_of};
-use super::listeners::Listeners;
 use super::mailbox::Mailbox;
 use super::service::{respond, waiting_bytes};
+use super::subscribers::Subscribers;
 use super::zenoh_sender::ZenohSender;
 use crate::args::Args;
 use crate::inbox::Inbox;
@@ -24,40 +24,39 @@ use zenoh_ext::{
     MissDetectionConfig, RecoveryConfig,
 };
 
-/// A node of `rmw_zenoh`'s graph.
 pub struct ZenohNode {
     session: Session,
     name: GraphName,
     names: Names,
     inbox: Arc<Inbox>,
-    /// Of a message.
-    most_bytes: usize,
+    max_bytes: usize,
     tokens: Vec<LivelinessToken>,
-    /// Ends the threads that read.
+    /// Callbacks that stop the reader threads.
     closers: Vec<Box<dyn Fn() + Send>>,
 }
 
-/// As services are in ROS 2.
+/// Quality of service of services in ROS 2.
 const SERVICE_QOS: Qos = Qos::reliable(10);
-/// With its attachment and its parameters.
+/// Maximum size of a request including attachment and parameters.
 const MAX_REQUEST_BYTES: usize = 1 << 20;
-/// How often a publisher tells what it has sent last, while something new was sent.
+/// Interval at which a publisher repeats its last sequence number after new messages.
 const HEARTBEAT: Duration = Duration::from_millis(500);
 
 impl ZenohNode {
-    /// Opens the session and announces the node. A router that is not there yet is looked for again and again.
+    /// Opens the session and announces the node. If the router is missing, Zenoh retries without a time limit.
     ///
     /// # Errors
     ///
-    /// A configuration that is none; no sockets; names that ROS 2 does not know.
+    /// An invalid configuration, no sockets, or invalid names.
     pub fn join(args: &Args, inbox: &Arc<Inbox>) -> anyhow::Result<Self> {
         let names = args.names()?;
         names.of_node()?;
         let session = zenoh::open(configuration(args)?).wait();
-        let session = session.map_err(|error| anyhow!("--transport zenoh: no session: {error}"))?;
+        let session =
+            session.map_err(|error| anyhow!("--transport zenoh: cannot open the session: {error}"))?;
         if session.info().routers_zid().wait().next().is_none() {
             log::warn!(
-                "no Zenoh router answers yet ({}); the node keeps trying; start one with: ros2 run rmw_zenoh_cpp rmw_zenohd",
+                "no Zenoh router answers ({}); the node will retry; start a router with: ros2 run rmw_zenoh_cpp rmw_zenohd",
                 args.zenoh_config
                     .as_ref()
                     .map_or_else(|| args.zenoh_router.join(" "), |path| path.display().to_string())
@@ -69,9 +68,9 @@ impl ZenohNode {
             namespace: names.namespace().to_owned(),
             node_name: args.node_name.clone(),
         };
-        let most_bytes = args.queue_bytes();
+        let max_bytes = args.queue_bytes();
         let (tokens, closers) = (Vec::new(), Vec::new());
-        let mut node = Self { session, name, names, inbox: inbox.clone(), most_bytes, tokens, closers };
+        let mut node = Self { session, name, names, inbox: inbox.clone(), max_bytes, tokens, closers };
         node.announce(node.name.token())?;
         Ok(node)
     }
@@ -79,7 +78,7 @@ impl ZenohNode {
     pub fn subscribe(&mut self, topic: &str, kind: TypeName, qos: Qos, put: Put) -> anyhow::Result<()> {
         let channel = Channel::topic(&self.names, topic, kind)?;
         let key = key(&channel.key(self.name.domain_id))?;
-        let mailbox = Mailbox::new(qos.depth, self.most_bytes);
+        let mailbox = Mailbox::new(qos.depth, self.max_bytes);
         let callback = self.receiver(&mailbox);
         let subscriber = self.session.declare_subscriber(key).callback(callback);
         let declared = if qos.is_latched {
@@ -95,9 +94,9 @@ impl ZenohNode {
             subscriber.background().wait()
         };
         declared.map_err(|error| anyhow!("{}: {error}", channel.name))?;
-        let its_mailbox = mailbox.clone();
+        let reader_mailbox = mailbox.clone();
         spawn("reader", move || {
-            while let Some(message) = its_mailbox.take() {
+            while let Some(message) = reader_mailbox.take() {
                 put(message);
             }
         })?;
@@ -109,13 +108,13 @@ impl ZenohNode {
     pub fn advertise(&mut self, topic: &str, kind: TypeName, qos: Qos) -> anyhow::Result<ZenohSender> {
         let channel = Channel::topic(&self.names, topic, kind)?;
         let failed = |error: zenoh::Error| anyhow!("{}: {error}", channel.name);
-        let listeners = Listeners::default();
-        let noted = listeners.clone();
+        let subscribers = Subscribers::default();
+        let counted = subscribers.clone();
         self.session
             .liveliness()
             .declare_subscriber(key(&self.name.subscriptions(&channel))?)
             .history(true)
-            .callback(move |sample| noted.note(sample.key_expr().as_str(), sample.kind()))
+            .callback(move |sample| counted.note(sample.key_expr().as_str(), sample.kind()))
             .background()
             .wait()
             .map_err(failed)?;
@@ -129,7 +128,7 @@ impl ZenohNode {
         }
         let publisher = publisher.wait().map_err(failed)?;
         let gid = gid_of(&self.announce_end(End::Publisher, &channel, qos)?);
-        Ok(ZenohSender { publisher, listeners, gid, sent: AtomicI64::new(0) })
+        Ok(ZenohSender { publisher, subscribers, gid, sent: AtomicI64::new(0) })
     }
 
     pub fn serve<Q, A>(
@@ -150,22 +149,22 @@ impl ZenohNode {
             .declare_queryable(key.clone())
             .complete(true)
             .callback(move |query| {
-                // Who gets no answer is told so: Zenoh does it where a query is dropped.
+                // Zenoh reports an error to the client when the query is dropped.
                 let lost = match waiting_bytes(&query) {
                     Some(bytes) if bytes <= MAX_REQUEST_BYTES => to.put(query, bytes),
                     _ => 1,
                 };
                 if lost > 0 {
-                    log::debug!("{label}: a request is not answered: none, too large, or more than can wait");
+                    log::debug!("{label}: a request is dropped: invalid, too large, or the queue is full");
                     inbox.count(|counters| counters.transport_errors += lost as u64);
                 }
             })
             .background()
             .wait()
             .map_err(|error| anyhow!("{}: {error}", channel.name))?;
-        let its_mailbox = mailbox.clone();
+        let service_mailbox = mailbox.clone();
         spawn("service", move || {
-            while let Some(query) = its_mailbox.take() {
+            while let Some(query) = service_mailbox.take() {
                 respond(&query, &key, &answer);
             }
         })?;
@@ -174,21 +173,21 @@ impl ZenohNode {
         Ok(())
     }
 
-    /// Takes all tokens back and closes the session.
+    /// Withdraws all tokens and closes the session.
     pub fn leave(self) {
         drop(self.tokens);
         if let Err(error) = self.session.close().wait() {
-            log::warn!("the session of Zenoh was not closed: {error}");
+            log::warn!("cannot close the Zenoh session: {error}");
         }
         self.closers.iter().for_each(|close| close());
     }
 
-    /// What Zenoh's threads do with a sample: they only put it where it waits.
+    /// Returns the callback of a subscription. It only queues the message, so that Zenoh's threads do not wait.
     fn receiver(&self, mailbox: &Arc<Mailbox<Message>>) -> impl Fn(Sample) + Send + Sync + 'static {
-        let (mailbox, inbox, most_bytes) = (mailbox.clone(), self.inbox.clone(), self.most_bytes);
+        let (mailbox, inbox, max_bytes) = (mailbox.clone(), self.inbox.clone(), self.max_bytes);
         move |sample| {
             let bytes = sample.payload().len();
-            if bytes > most_bytes {
+            if bytes > max_bytes {
                 log::debug!("{}: a message of {bytes} bytes is larger than the queue", sample.key_expr());
                 inbox.count(|counters| counters.too_large += 1);
                 return;
@@ -217,5 +216,5 @@ impl ZenohNode {
 }
 
 fn key(text: &str) -> anyhow::Result<KeyExpr<'static>> {
-    KeyExpr::try_from(text.to_owned()).map_err(|error| anyhow!("{text}: no key of Zenoh: {error}"))
+    KeyExpr::try_from(text.to_owned()).map_err(|error| anyhow!("{text}: invalid Zenoh key: {error}"))
 }

@@ -1,24 +1,24 @@
 use super::attachment::{Attachment, GID_BYTES};
 use super::cdr;
-use super::listeners::Listeners;
+use super::subscribers::Subscribers;
 use anyhow::anyhow;
 use serde::Serialize;
 use std::sync::atomic::{AtomicI64, Ordering};
 use zenoh::Wait as _;
 use zenoh_ext::AdvancedPublisher;
 
-/// A publisher, and who listens.
+/// Publisher with the subscriptions of its topic.
 pub struct ZenohSender {
     pub publisher: AdvancedPublisher<'static>,
-    pub listeners: Listeners,
+    pub subscribers: Subscribers,
     pub gid: [u8; GID_BYTES],
     pub sent: AtomicI64,
 }
 
 impl ZenohSender {
-    /// Subscriptions of ROS; if there are none, 1 for those that have no token.
-    pub fn listeners(&self) -> usize {
-        match self.listeners.count() {
+    /// Returns the number of ROS subscriptions; without any, 1 if Zenoh subscribers without a token match.
+    pub fn subscribers(&self) -> usize {
+        match self.subscribers.count() {
             0 => self.publisher.matching_status().wait().map_or(0, |status| usize::from(status.matching())),
             count => count,
         }
