@@ -13,7 +13,7 @@ fn disks() -> [(&'static str, Arc<dyn Disk>); 3] {
     [
         ("synced", Arc::new(FsDisk)),
         ("not synced", UnsyncedDisk::shared()),
-        ("5 ms a sync", UnsyncedDisk::taking(Duration::from_millis(5))),
+        ("5 ms a sync", UnsyncedDisk::with_sync_time(Duration::from_millis(5))),
     ]
 }
 

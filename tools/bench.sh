@@ -1,13 +1,13 @@
 #!/usr/bin/env bash
-# The benchmarks, one driver for all:
+# Runs the benchmarks:
 #
 #   tools/bench.sh                     lists them
-#   tools/bench.sh NAME [OPTIONS]      runs one; `all` runs all, with options that all of them have
+#   tools/bench.sh NAME [OPTIONS]      runs one; `all` runs all of them, with common options only
 #
-# Options of all: --short (check only that everything works; docs/ stays as it is), --only PART (an unknown name lists
-# the parts), --runs N (figures are medians), --out FOLDER (where results go). `tools/bench.sh NAME --help` lists the
-# others. Recorded data comes from below ${VOXTILE_DATA:-../shared/data}; a set that is absent is skipped. A benchmark
-# exits with 1 if something is wrong that does not depend on time, with 2 after an error.
+# Common options: --short (checks only that everything works and leaves docs/ unchanged), --only PART (an unknown name
+# lists the parts), --runs N (figures are medians), --out FOLDER (for the results). `tools/bench.sh NAME --help` lists
+# the others. Recorded data is read from ${VOXTILE_DATA:-../shared/data}; missing data sets are skipped. A benchmark
+# exits with 1 if a check that does not depend on time fails, and with 2 after an error.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 target=${CARGO_TARGET_DIR:-target}
@@ -16,8 +16,8 @@ list() {
     echo "benchmarks, to run with tools/bench.sh NAME:"
     echo "  endurance  memory, cost of a scan, speed in little memory, over distance: docs/measurements/endurance.md"
     echo "  octocache  the questions of the OctoCache paper: docs/measurements/octocache.md"
-    echo "  peers      speed, memory and exactness beside OctoMap: a table on standard output"
-    echo "  versions   speed beside an earlier version: docs/measurements/versions.md; --before COMMIT names it"
+    echo "  peers      speed, memory and exactness compared with OctoMap: a table on standard output"
+    echo "  versions   speed compared with an earlier version (--before COMMIT): docs/measurements/versions.md"
 }
 
 run() { # package, arguments
@@ -44,7 +44,7 @@ peers() {
     run peers "${contenders[@]}" --octomap-version "$version" "$@"
 }
 
-# The programs of both versions; the earlier one is built from a checkout of its own.
+# Builds the programs of both versions, the earlier one from its own checkout.
 versions() {
     local options=() commit= source=$target/versions/source
     while [[ $# -gt 0 ]]; do
@@ -53,16 +53,16 @@ versions() {
         *) options+=("$1") && shift ;;
         esac
     done
-    [[ -n $commit ]] || { echo "versions: say --before COMMIT" >&2 && exit 2; }
+    [[ -n $commit ]] || { echo "versions: --before COMMIT is required" >&2 && exit 2; }
     cargo build --release --quiet --locked --package voxtile-cli --package peers --package versions
     git worktree remove --force "$source" 2>/dev/null || rm -rf "$source"
     git worktree prune
     git worktree add --quiet --detach "$source" "$commit"
-    # The same questions are put to both.
+    # Both versions run the same questions.
     cp tools/peers/src/bin/questions.rs "$source/tools/peers/src/bin/"
     local before
     before=$(realpath "$target")/versions/before
-    # Whatever package the command is in there.
+    # The earlier version may have the command in another package.
     (cd "$source" && export CARGO_TARGET_DIR=$before && cargo build --release --quiet --locked --workspace --bin voxtile &&
         cargo build --release --quiet --locked --package peers)
     git worktree remove --force "$source"
@@ -77,13 +77,13 @@ endurance | octocache | peers | versions) "$name" "$@" ;;
 all)
     failed=()
     for name in endurance octocache peers; do
-        # A process of its own: `set -e` stops it at the first error.
+        # `set -e` stops this separate process at the first error.
         tools/bench.sh "$name" "$@" || failed+=("$name")
     done
     [[ ${#failed[@]} -eq 0 ]] || { echo "bench: failed: ${failed[*]}" >&2 && exit 1; }
     ;;
 *)
-    echo "bench: there is no benchmark $name" >&2
+    echo "bench: no benchmark named $name" >&2
     list >&2
     exit 2
     ;;

@@ -1,8 +1,8 @@
 """Benchmark of the same inserts and queries from Python and from Rust: CPU seconds, medians of alternating runs.
 
-    cargo build --release -p peers --bin asked_from_rust
+    cargo build --release -p peers --bin rust_queries
 
-    python benchmarks/beside_rust.py ../target/release/asked_from_rust [RUNS]
+    python benchmarks/beside_rust.py ../target/release/rust_queries [RUNS]
 
 Each run is a separate process with a new map. On a noisy machine compare the minimum times rather than the medians.
 Needs the package as `maturin build --release` builds it.

@@ -183,7 +183,7 @@ fn insist<S, T>(
             Ok(done) => return Ok(done),
             Err(error) if disk.has_crashed() => return Err(error),
             // A file that was unreadable when the map was opened is reported as damaged until the map is reopened.
-            Err(error @ Error::Damaged { .. }) if disk.had_a_fault_that_stays() => return Err(error),
+            Err(error @ Error::Damaged { .. }) if disk.had_permanent_fault() => return Err(error),
             Err(error) => {
                 assert!(number < 3 && matches!(error, Error::Io { .. }), "attempt {number}: {error:#}");
                 look(subject);
@@ -221,7 +221,7 @@ impl Subject for Build {
         let mut progress = Progress { is_early: true, safe: from, tried: from, failed: None };
         let end = self.run_on(disk, from, &mut progress);
         if let Err(error) = &end {
-            assert!(disk.has_crashed() || disk.had_a_fault_that_stays(), "{error:#}");
+            assert!(disk.has_crashed() || disk.had_permanent_fault(), "{error:#}");
         }
         progress.reached(end)
     }

@@ -209,7 +209,7 @@ fn answers_during(reader: &LiveReader, work: impl FnOnce() + Send) -> u64 {
 fn readers_do_not_wait_for_flushes() {
     let folder = memory_folder();
     let config = MapConfig::new(0.2, 1.6).unwrap();
-    let disk = UnsyncedDisk::taking(Duration::from_millis(150));
+    let disk = UnsyncedDisk::with_sync_time(Duration::from_millis(150));
     let mut mapper =
         OutOfCoreTileMapper::create(MapPath::on(disk, folder.path().join("map")), config).unwrap();
     scans(2)[..5].iter().for_each(|scan| insert(&mut mapper, scan));

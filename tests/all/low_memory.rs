@@ -55,7 +55,7 @@ fn statistics_count_everything_with_little_memory() {
     let mut expected = InMemoryMapper::new(config()).unwrap();
     const BYTES: usize = 900_000;
     let tight = config().with_tight_memory_bytes(BYTES);
-    let disk = UnsyncedDisk::taking(Duration::ZERO);
+    let disk = UnsyncedDisk::with_sync_time(Duration::ZERO);
     let mut mapper =
         OutOfCoreTileMapper::create(MapPath::on(disk, folder.path().join("map")), tight).unwrap();
     let mut most = 0;
@@ -120,7 +120,7 @@ fn a_flush_does_not_overtake_an_older_version_of_a_tile() {
         let folder = memory_folder();
         let path = folder.path().join("map");
         let tight = config().with_tight_memory_bytes(bytes);
-        let disk = UnsyncedDisk::slow_beside(Duration::from_millis(3));
+        let disk = UnsyncedDisk::slow_in_background(Duration::from_millis(3));
         let mut mapper = OutOfCoreTileMapper::create(MapPath::on(disk.clone(), &path), tight).unwrap();
         let mut expected = InMemoryMapper::new(config()).unwrap();
         for (number, scan) in scans.iter().chain(&scans).enumerate() {

@@ -21,7 +21,7 @@ TEMPORARY.mkdir()
 
 
 class Proxy(BaseHTTPRequestHandler):
-    """Hands requests on to the server behind it, but for what `fault` does to some."""
+    """Forwards requests to the server `behind`; every third one suffers `fault`."""
 
     protocol_version = "HTTP/1.1"
     behind = ("127.0.0.1", 0)
@@ -126,7 +126,7 @@ def check(port):
     assert first["tiles_sent"] == first["tiles"] > 0, first
     assert json.loads(voxtile("push", MAP, url, "--json", port=port))["objects_sent"] == 0
 
-    # Each command that reads says there what it says in the folder.
+    # The reading commands print the same for the bucket as for the folder.
     for command in (
         ["digest", "{}"],
         ["query", "{}", 10, 0.5, 0.1],
@@ -144,7 +144,7 @@ def check(port):
     assert json.loads(voxtile("info", url, "--json", port=port))["tiles"] == first["tiles"]
     print("read there: digest, query, raycast, verify, export, info")
 
-    # What is not there, and what would write.
+    # Missing maps and writing commands fail.
     assert "no map here" in voxtile("info", "s3://robots/maps/none", port=port, fails=True)
     assert "is read-only" in voxtile("clear", url, "--region", 0, 0, 0, 1, 1, 1, port=port, fails=True)
     assert "is read-only" in voxtile("crop", MAP, "-o", url, "--region", 0, 0, 0, 9, 9, 9, port=port, fails=True)
@@ -153,7 +153,7 @@ def check(port):
     assert voxtile("digest", WORK / "pulled", port=port) == digest
     voxtile("verify", WORK / "pulled", port=port)
 
-    # Another robot adds to its copy and pushes; the first one's copy is behind then.
+    # Another robot adds to its copy and pushes. The first copy is then behind.
     voxtile("clear", WORK / "pulled", "--region", 0, -3, -3, 8, 3, 3, port=port)
     second = json.loads(voxtile("push", WORK / "pulled", url, "--json", "--prune", port=port))
     assert 0 < second["tiles_sent"] < second["tiles"] and second["objects_pruned"] > 0, second
@@ -165,7 +165,7 @@ def check(port):
     assert digest == voxtile("digest", url, port=port) == voxtile("digest", WORK / "pulled", port=port)
     print("pushed and pulled what changed:", replaced["files_fetched"], "of", replaced["files"], "files")
 
-    # A network that is slow, fails and cuts off.
+    # A slow, failing and interrupted network.
     Proxy.behind = ("127.0.0.1", port)
     server = ThreadingHTTPServer(("127.0.0.1", 0), Proxy)
     threading.Thread(target=server.serve_forever, daemon=True).start()
@@ -178,7 +178,7 @@ def check(port):
         Proxy.fault = None
         assert voxtile("digest", f"{url}-{fault.replace(' ', '-')}", port=port) == digest, fault
         print(f"{fault}: {time.monotonic() - began:.1f} s")
-    # A plain web server has a copy of the objects, for reading.
+    # A plain web server offers a copy of the objects for reading.
     pages = s3.get_paginator("list_objects_v2").paginate(Bucket="robots", Prefix="maps/city/")
     keys = [found["Key"] for page in pages for found in page["Contents"]]
     for key in keys:
@@ -190,18 +190,18 @@ def check(port):
     assert voxtile("digest", web, port=port) == digest
     assert "cannot be written to" in voxtile("push", MAP, web, port=port, fails=True)
 
-    # An object that is changed, cut or missing is named.
+    # Errors name objects that are changed, truncated or missing.
     name = next(key for key in keys if "/objects/" in key)
     for content in (b"other", b"", None):
         if content is None:
             s3.delete_object(Bucket="robots", Key=name)
         else:
             s3.put_object(Bucket="robots", Key=name, Body=content)
-        said = voxtile("pull", url, WORK / "broken", port=port, fails=True)
-        assert name in said, said
+        output = voxtile("pull", url, WORK / "broken", port=port, fails=True)
+        assert name in output, output
         shutil.rmtree(WORK / "broken.unfinished", ignore_errors=True)
-    assert "push --resend" in said, said
-    print("objects that were changed, cut and missing are named")
+    assert "push --resend" in output, output
+    print("objects that were changed, truncated or missing are named")
     voxtile("push", WORK / "pulled", url, "--resend", port=port)
     assert voxtile("digest", url, port=port) == digest
     voxtile("verify", url, port=port)
@@ -211,7 +211,7 @@ def check(port):
 
 
 def check_scans(s3, port, bad):
-    """Scans that lie in a bucket make the map of those in a folder."""
+    """Scans in a bucket give the same map as scans in a folder."""
     drive, chance = WORK / "web" / "drive", random.Random(3)
     (drive / "scans").mkdir(parents=True)
     for number in range(20):
@@ -227,36 +227,36 @@ def check_scans(s3, port, bad):
     digest = voxtile("digest", WORK / "of_folder", port=port)
     for number, (fault, through) in enumerate([(None, port), ("500", bad), ("cut off", bad)]):
         Proxy.fault = fault
-        made = WORK / f"of_bucket_{number}"
-        voxtile("build", "s3://robots/drive", "-o", made, *options, port=through)
+        built = WORK / f"of_bucket_{number}"
+        voxtile("build", "s3://robots/drive", "-o", built, *options, port=through)
         Proxy.fault = None
-        assert voxtile("digest", made, port=port) == digest, fault
-        # It is known as what it is, wherever it lies.
-        assert "resum" in voxtile("build", drive, "-o", made, "--resume", "--json", port=port), fault
-    told = json.loads(voxtile("scans", "s3://robots/drive/", "--json", port=port).splitlines()[-1])
-    assert told["scans"] == 20, told
+        assert voxtile("digest", built, port=port) == digest, fault
+        # The folder and the bucket count as the same input.
+        assert "resum" in voxtile("build", drive, "-o", built, "--resume", "--json", port=port), fault
+    listing = json.loads(voxtile("scans", "s3://robots/drive/", "--json", port=port).splitlines()[-1])
+    assert listing["scans"] == 20, listing
     web = ThreadingHTTPServer(("127.0.0.1", 0), partial(Files, directory=WORK / "web"))
     threading.Thread(target=web.serve_forever, daemon=True).start()
     one = f"http://127.0.0.1:{web.server_port}/drive/scans/7.pcd"
     voxtile("build", one, "-o", WORK / "one_there", "--resolution", 0.5, "--poses", "identity", port=port)
     voxtile("build", drive / "scans" / "7.pcd", "-o", WORK / "one", "--resolution", 0.5, "--poses", "identity", port=port)
     assert voxtile("digest", WORK / "one_there", port=port) == voxtile("digest", WORK / "one", port=port)
-    said = voxtile("build", "s3://robots/nowhere", "-o", WORK / "none", "--resolution", 0.5, port=port, fails=True)
-    assert "s3://robots/nowhere: there is nothing" in said, said
-    assert not list(TEMPORARY.glob("voxtile-scans-*")), "what was fetched is left behind"
+    output = voxtile("build", "s3://robots/nowhere", "-o", WORK / "none", "--resolution", 0.5, port=port, fails=True)
+    assert "s3://robots/nowhere: there is nothing" in output, output
+    assert not list(TEMPORARY.glob("voxtile-scans-*")), "fetched files are left behind"
 
-    # The scans that a map keeps, where it lies.
+    # Kept scans are readable from the bucket.
     voxtile("push", WORK / "of_folder", "s3://robots/kept", port=port)
     listed = [voxtile("scans", map, port=port) for map in (WORK / "of_folder", "s3://robots/kept")]
     assert listed[0].splitlines()[1:] == listed[1].splitlines()[1:], listed
     voxtile("build", "s3://robots/kept", "-o", WORK / "again", "--resolution", 0.5, port=port)
     assert voxtile("digest", WORK / "again", port=port) == digest
 
-    # Without keys it is said which are missing.
+    # The error names the missing keys.
     lacking = {name: value for name, value in environment(port).items() if not name.startswith("AWS_")}
     done = subprocess.run([VOXTILE, "info", "s3://robots/kept"], env=lacking, capture_output=True, text=True, timeout=300)
     assert done.returncode != 0 and "AWS_ACCESS_KEY_ID" in done.stderr, done.stderr
-    print("scans of a bucket make the map of those in a folder")
+    print("scans in a bucket give the same map as scans in a folder")
 
 
 main()

@@ -1,9 +1,9 @@
 #!/usr/bin/env bash
-# Maps in a bucket against servers in processes of their own: PyPI moto as S3, and a plain web server.
+# Checks maps in a bucket against separate servers: moto (from PyPI) as S3, and a plain web server.
 #
-#   tools/bucket/check.sh        VOXTILE_BIN names the folder of a voxtile with the feature `bucket`
+#   tools/bucket/check.sh        VOXTILE_BIN: folder of a voxtile with the feature `bucket`
 #
-# It makes a virtual environment for moto, or takes the Python that VOXTILE_MOTO_PYTHON names.
+# Installs moto into a virtual environment unless VOXTILE_MOTO_PYTHON names a Python that has it.
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 bin=${VOXTILE_BIN:-target/debug}

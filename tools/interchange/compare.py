@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
-"""Compares the points that another program read from a file with the voxels of the map: every point is in its voxel.
+"""Checks that each point that another program read from a file is in its voxel of the map.
 
     compare.py MAP.csv RESOLUTION FILE WHO [--any-order] < POINTS
 
-MAP.csv is the map's export without an origin; FILE.origin.json, where it is there, tells what is to be added to FILE's
-points. A line `# origin X Y Z` before the points, which a PCD's VIEWPOINT gives, must say the same. Python alone.
+MAP.csv is the map's export without an origin; FILE.origin.json, if it exists, has the offset of FILE's
+points. A line `# origin X Y Z` before the points (from a PCD's VIEWPOINT) must match it. Needs only Python.
 """
 import csv
 import json
@@ -21,15 +21,15 @@ def main():
 
     with open(table, newline="") as rows:
         expected = [voxel(float(row[k]) for k in "xyz") for row in csv.DictReader(rows)]
-    beside = pathlib.Path(path + ".origin.json")
-    origin = json.loads(beside.read_text())["origin_m"] if beside.exists() else [0.0, 0.0, 0.0]
+    sidecar = pathlib.Path(path + ".origin.json")
+    origin = json.loads(sidecar.read_text())["origin_m"] if sidecar.exists() else [0.0, 0.0, 0.0]
     found, worst = [], 0.0
     for line in sys.stdin:
         words = line.replace(",", " ").split()
         if words[:2] == ["#", "origin"]:
-            told = [float(x) for x in words[2:5]]
-            if told != origin:
-                sys.exit(f"{who}: {path}: the origin is told as {told}, and is {origin}")
+            reported = [float(x) for x in words[2:5]]
+            if reported != origin:
+                sys.exit(f"{who}: {path}: the reported origin is {reported}, not {origin}")
         elif words and not words[0].startswith(("#", "/")):
             point = [float(x) + o for x, o in zip(words[:3], origin)]
             found.append(voxel(point))

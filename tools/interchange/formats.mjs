@@ -1,4 +1,4 @@
-// What libraries of npm make of a file: `formats.mjs gltf FILE` its errors, `formats.mjs copc FILE` its points.
+// Reads a file with libraries of npm: `formats.mjs gltf FILE` prints its errors, `formats.mjs copc FILE` its points.
 import { open, readFile } from "node:fs/promises"
 import { createRequire } from "node:module"
 

@@ -1,4 +1,4 @@
-"""Reads voxels back from every format that voxtile-formats writes, with the libraries of others; see formats.sh."""
+"""Reads voxels back from every format that voxtile-formats writes, with third-party libraries; see formats.sh."""
 
 import json
 import math
@@ -18,13 +18,13 @@ from PIL import Image
 
 try:
     import open3d
-except ImportError:  # half a gigabyte: where it is there
+except ImportError:  # optional: it takes half a gigabyte
     open3d = None
 
 RESOLUTION = 0.1
 UTM = (500123.4, 4182321.7, 57.3)
 SCENES = {
-    # Name: the true coordinates of index 0, what is added to indices, what single precision needs subtracted.
+    # Name: coordinates of index 0, offset of the indices, offset subtracted for single precision.
     "near": ((0.0, 0.0, 0.0), (0, 0, 0), (0.0, 0.0, 0.0)),
     "utm": (UTM, (0, 0, 0), (500000.0, 4182000.0, 0.0)),
     "far indices": ((0.0, 0.0, 0.0), (5001234, 41823217, 573), (500000.0, 4182000.0, 0.0)),
@@ -66,14 +66,14 @@ class Scene:
         return path
 
     def same(self, points, log_odds=None, count=None, probability=None, tolerance=1e-6):
-        """Every voxel comes back to its index, once, with what belongs to it."""
+        """Checks that every voxel is read back once, at its index, with its values."""
         points = np.asarray(points, dtype=np.float64)
         index = np.floor((points - self.origin) / RESOLUTION).astype(np.int64)
         away = np.abs((points - self.origin) / RESOLUTION - index - 0.5).max()
         order = np.lexsort(index.T[::-1])
         expected = np.lexsort(self.voxels.T[::-1])
         assert len(index) == len(self.voxels), f"{len(index)} voxels of {len(self.voxels)}"
-        assert (index[order] == self.voxels[expected]).all(), "a voxel comes back to another index"
+        assert (index[order] == self.voxels[expected]).all(), "a voxel is read back at another index"
         for name, found, wanted, within in [
             ("log_odds", log_odds, self.log_odds, 0),
             ("count", count, self.count, 0),
@@ -99,19 +99,19 @@ def npz(scene):
 
 def nav2(scene):
     path = scene.write("nav2", "map.pgm")
-    said = yaml.safe_load(path.with_suffix(".yaml").read_text())
-    picture = np.asarray(Image.open(path.with_name(said["image"])))
+    metadata = yaml.safe_load(path.with_suffix(".yaml").read_text())
+    picture = np.asarray(Image.open(path.with_name(metadata["image"])))
     p = (255.0 - picture) / 255.0
     states = np.full(picture.shape, -1)
-    states[p > said["occupied_thresh"]] = 100
-    states[p < said["free_thresh"]] = 0
+    states[p > metadata["occupied_thresh"]] = 100
+    states[p < metadata["free_thresh"]] = 0
     expected = {}
     for (x, y, _), occupied in zip(scene.voxels.tolist(), scene.log_odds >= 0):
         expected[x, y] = max(expected.get((x, y), 0), 100 if occupied else 0)
     found = {}
     for row, column in np.argwhere(states >= 0):
-        at = [(column + 0.5) * said["resolution"], (picture.shape[0] - row - 0.5) * said["resolution"]]
-        index = [math.floor((at[k] + said["origin"][k] - scene.origin[k]) / RESOLUTION) for k in range(2)]
+        at = [(column + 0.5) * metadata["resolution"], (picture.shape[0] - row - 0.5) * metadata["resolution"]]
+        index = [math.floor((at[k] + metadata["origin"][k] - scene.origin[k]) / RESOLUTION) for k in range(2)]
         found[tuple(index)] = states[row, column]
     assert found == expected, "columns differ"
     unknown = (states < 0).sum()
@@ -158,9 +158,9 @@ def copc(scene):
     with laspy.CopcReader.open(path) as reader:
         cloud = reader.query()
         xyz = at(cloud)
-        said = scene.same(xyz, cloud.log_odds, cloud["count"], cloud.intensity / 65535, tolerance=1e-5)
+        metadata = scene.same(xyz, cloud.log_odds, cloud["count"], cloud.intensity / 65535, tolerance=1e-5)
         coarse = [len(reader.query(level=level)) for level in range(3)]
-        # The coarsest level alone spreads over everything: each of its cells with a voxel has exactly one.
+        # The coarsest level alone covers everything: each of its cells with a voxel has exactly one.
         cell = reader.copc_info.spacing
         corner = np.array(reader.copc_info.center) - reader.copc_info.halfsize
         cells = np.unique(np.floor((xyz - corner) / cell).astype(int), axis=0)
@@ -170,9 +170,9 @@ def copc(scene):
         box = laspy.copc.Bounds(xyz.min(0), half)
         inside = (xyz <= half).all(1).sum()
         assert len(reader.query(bounds=box)) == inside, "a box gives other points"
-    # As a plain LAZ file, too.
+    # The file is also readable as plain LAZ.
     scene.same(laspy.read(path).xyz)
-    return f"{said}; levels {coarse}"
+    return f"{metadata}; levels {coarse}"
 
 
 def copc_npm(scene, script):
@@ -209,7 +209,7 @@ def quantized_glb(scene):
 
 
 def open3d_glb(scene):
-    """Reads vertices as they are: it knows no quantized ones, and merges equal ones."""
+    """Open3D cannot read quantized vertices, and merges equal ones: compares the area."""
     mesh = open3d.io.read_triangle_mesh(str(scene.write("glb", "o.glb")))
     turned = np.asarray(mesh.vertices)[:, [0, 2, 1]] * [1, -1, 1]
     lattice = (turned - scene.origin) / RESOLUTION
@@ -226,7 +226,7 @@ def check_mesh(scene, path):
     (node,) = loaded.graph.nodes_geometry
     matrix, geometry = loaded.graph[node]
     mesh = loaded.geometry[geometry]
-    # Whole numbers of voxels; the node's matrix makes metres of them. glTF's y is up.
+    # Vertices are whole numbers of voxels, which the node's matrix scales to metres. In glTF, y is up.
     world = np.asarray(mesh.vertices, np.float64) @ matrix[:3, :3].T + matrix[:3, 3]
     turned = np.stack([world[:, 0], -world[:, 2], world[:, 1]], 1)
     lattice = (turned - scene.origin) / RESOLUTION
@@ -251,9 +251,9 @@ def check_mesh(scene, path):
                     found.add(face)
     assert found == expected, f"{len(found ^ expected)} faces differ"
     data = path.read_bytes()
-    said = json.loads(data[20 : 20 + int.from_bytes(data[12:16], "little")])
+    metadata = json.loads(data[20 : 20 + int.from_bytes(data[12:16], "little")])
     low = scene.voxels[scene.log_odds >= 0].min(0) * RESOLUTION + scene.origin
-    assert np.allclose(said["nodes"][0]["extras"]["origin_m"], low, rtol=0, atol=1e-6)
+    assert np.allclose(metadata["nodes"][0]["extras"]["origin_m"], low, rtol=0, atol=1e-6)
     return f"{len(found)} faces in {len(quads)} rectangles"
 
 
@@ -295,16 +295,16 @@ def read_pcd(path):
 
 def autoware(scene):
     folder = scene.write("autoware", "pointcloud_map")
-    said = yaml.safe_load((folder / "pointcloud_map_metadata.yaml").read_text())
-    edges = np.array([said.pop("x_resolution"), said.pop("y_resolution")])
-    assert set(said) == {path.name for path in folder.glob("*.pcd")} and len(said) > 3
+    metadata = yaml.safe_load((folder / "pointcloud_map_metadata.yaml").read_text())
+    edges = np.array([metadata.pop("x_resolution"), metadata.pop("y_resolution")])
+    assert set(metadata) == {path.name for path in folder.glob("*.pcd")} and len(metadata) > 3
     rows = []
-    for name, corner in said.items():
+    for name, corner in metadata.items():
         points = read_pcd(folder / name)
         assert (points[:, :2] >= corner).all() and (points[:, :2] < corner + edges).all(), f"{name}: outside"
         rows.append(points)
     rows = np.concatenate(rows)
-    return f"{scene.same(rows[:, :3] + scene.subtract, probability=rows[:, 3])}; {len(said)} files"
+    return f"{scene.same(rows[:, :3] + scene.subtract, probability=rows[:, 3])}; {len(metadata)} files"
 
 
 def mcap(scene):
@@ -324,8 +324,8 @@ def mcap(scene):
             clouds += 1
     rows = np.concatenate(rows)
     points = np.stack([rows[k].astype(np.float64) for k in "xyz"], 1)
-    said = scene.same(points, rows["log_odds"], rows["count"], rows["intensity"])
-    return f"{said}; {clouds} clouds, {rows['x'].dtype}"
+    metadata = scene.same(points, rows["log_odds"], rows["count"], rows["intensity"])
+    return f"{metadata}; {clouds} clouds, {rows['x'].dtype}"
 
 
 def main():
@@ -344,7 +344,7 @@ def main():
         for label, check in checks:
             try:
                 print(f"ok      {name}, {label}: {check(scene)}", flush=True)
-            except Exception as error:  # every format gets its say
+            except Exception as error:  # continue with the other formats
                 failed = True
                 print(f"FAILED  {name}, {label}: {type(error).__name__}: {error}", flush=True)
     sys.exit(failed)

@@ -1,11 +1,11 @@
 #!/bin/sh
-# Other programs read what voxtile-formats writes: every format is read back with somebody else's library, and every voxel
-# must come back to its index exactly; near the origin, around UTM coordinates, and with indices that reach that far.
+# Reads everything that voxtile-formats writes with third-party libraries. Every voxel must be read back exactly at its
+# index, near the origin, around UTM coordinates, and with equally large indices.
 #
 #   tools/interchange/formats.sh
 #
-# Needs python3 with venv; its packages, and those of npm where node is there, go to a temporary folder. VOXTILE_BIN is a
-# folder with a built `write_voxels`. Exits with 1 if a comparison fails.
+# Needs python3 with venv. The Python packages, and npm packages if node is installed, are put into a temporary folder.
+# VOXTILE_BIN is a folder with a built `write_voxels`. Exits with 1 if a comparison fails.
 set -eu
 cd "$(dirname "$0")/../.."
 here=tools/interchange
@@ -27,7 +27,7 @@ if command -v node >/dev/null && command -v npm >/dev/null; then
     cp "$here/formats.mjs" "$work/formats.mjs"
     npm="--npm $work/formats.mjs"
 else
-    echo "npm is not there: gltf-validator and copc are skipped"
+    echo "npm is not installed: gltf-validator and copc are skipped"
     npm=
 fi
 # shellcheck disable=SC2086

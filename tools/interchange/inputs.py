@@ -1,8 +1,8 @@
-"""The same scans in every format, each written by somebody else's library: `inputs.sh` builds a map of each.
+"""Writes the same scans in every format with third-party libraries; `inputs.sh` builds a map from each.
 
     inputs.py FOLDER [SCANS [POINTS]]
 
-The scans are made up: points on the walls of a hall as float32 in the sensor's frame, with intensities, and a smooth
+The scans are synthetic: points on the walls of a hall as float32 in the sensor's frame, with intensities, and a smooth
 trajectory of quaternions with time stamps in whole nanoseconds.
 """
 
@@ -81,7 +81,7 @@ def write_bag(writer, ros, scans, poses):
 
 
 def write_laz(path, scans, poses):
-    """All points in the world frame, each with its own time; coordinates in tenths of millimetres."""
+    """All points in the world frame, each with its own time. Coordinates are rounded to 0.1 mm."""
     header = laspy.LasHeader(point_format=6, version="1.4")
     header.scales, header.offsets = [1e-4] * 3, [0.0] * 3
     header.global_encoding.gps_time_type = laspy.header.GpsTimeType.STANDARD
@@ -112,7 +112,7 @@ def main():
         np.column_stack([xyz, intensity]).astype("<f4").tofile(folder / "kitti" / f"{k:03d}.bin")
         rows = [" ".join(repr(float(number)) for number in row) for row in np.column_stack([xyz, intensity])]
         (folder / "xyz" / f"{k:03d}.xyz").write_text("\n".join(rows) + "\n")
-        # By time stamp: the name is one, and poses are beside each other in another order.
+        # The file name is the time stamp; the poses are in another order.
         np.column_stack([xyz, intensity]).astype("<f4").tofile(folder / "stamped" / f"{stamps[k]}.bin")
     (folder / "stamped" / "poses_tum.txt").write_text("".join(reversed(lines.splitlines(keepends=True))))
     array = [[stamp / 1e9, *pose] for stamp, pose in zip(stamps, poses)]
@@ -122,11 +122,11 @@ def main():
     for (xyz, intensity), pose in zip(scans, poses):
         x, y, z = xyz.T.astype(float)
         columns = {"cartesianX": x, "cartesianY": y, "cartesianZ": z, "intensity": intensity.astype(float)}
-        # As quaternion w x y z.
+        # Quaternion w x y z.
         e57.write_scan_raw(columns, rotation=pose[[6, 3, 4, 5]], translation=pose[:3])
     e57.close()
     write_laz(folder / "scans.laz", scans, poses)
-    # In the middle of each scan. Adjusted standard GPS time is less by 10^9 seconds.
+    # The middle of each scan, in adjusted standard GPS time plus 10^9 seconds.
     middle_ns = 1_000_001_000_050_000_000
     (folder / "laz_poses.txt").write_text("".join(tum(middle_ns + k * PERIOD_NS, pose) for k, pose in enumerate(poses)))
     with Bag1Writer(folder / "scans.bag") as writer:

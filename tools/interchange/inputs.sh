@@ -1,11 +1,11 @@
 #!/bin/sh
-# The same scans in the formats of many programs, each written by somebody else's library, give one map: `inputs.py`
-# writes them, `voxtile build` reads them, and the digests are compared.
+# Checks that the same scans give the same map in many formats: `inputs.py` writes them with third-party libraries,
+# `voxtile build` reads them, and the digests are compared.
 #
 #   tools/interchange/inputs.sh
 #
-# Needs python3 with venv; its packages go to a temporary folder. VOXTILE_BIN is a folder of programs that are built
-# already. Exits with 1 if a digest differs that must not.
+# Needs python3 with venv; its packages are put into a temporary folder. VOXTILE_BIN is a folder of built programs.
+# Exits with 1 if digests differ that must be equal.
 set -eu
 cd "$(dirname "$0")/../.."
 here=tools/interchange
@@ -45,7 +45,7 @@ compare "KITTI .bin" "$in/kitti"
 compare "KITTI .bin, poses by stamp" "$in/stamped"
 compare "KITTI .bin, poses as .npy" "$in/kitti" --poses "$in/poses.npy"
 compare "ROS 1 bag, tf" "$in/scans.bag"
-compare "ROS 1 bag, poses of a file" "$in/scans.bag" --poses "$in/pcd/poses_tum.txt"
+compare "ROS 1 bag, poses from a file" "$in/scans.bag" --poses "$in/pcd/poses_tum.txt"
 compare "ROS 2 folder of MCAP, tf" "$in/rosbag2"
 compare "MCAP, tf" "$in/rosbag2/rosbag2.mcap"
 compare "E57, its own poses" "$in/scans.e57"
@@ -55,11 +55,11 @@ else
     echo "ROS 2 folder of SQLite       skipped: built without the feature sqlite"
 fi
 
-# Coordinates in tenths of millimetres and in the world frame: nearly every voxel is the same.
+# Coordinates are in the world frame and rounded to 0.1 mm: nearly every voxel is the same.
 digest_of "$in/pcd" >/dev/null
 mv "$work/map" "$work/exact"
 digest_of "$in/scans.laz" --world-frame --poses "$in/laz_poses.txt" >/dev/null
-count_of() { # name of a count; the JSON comes from standard input
+count_of() { # name of a count; reads JSON from standard input
     sed -n "s/.*\"$1\": *\([0-9]*\).*/\1/p" | head -1
 }
 voxels=$("$voxtile" info "$work/exact" --json | count_of voxels)

@@ -1,11 +1,11 @@
-"""A recording without poses, and how near the map of KISS-ICP's poses comes to that of the true ones; see kiss_icp.sh.
+"""Records a drive without poses, and compares the maps with KISS-ICP's poses and true poses; see kiss_icp.sh.
 
     kiss_icp.py record STREAM FOLDER
     kiss_icp.py align TRUE_TUM FOUND_KITTI ALIGNED_TUM
     kiss_icp.py compare NAME TRUE.npz FOUND.npz RESOLUTION [--shown-only]
 
 `record` reads a scan stream of a drive and writes FOLDER/drive.bag, and FOLDER/true_tum.txt with its poses. `align`
-moves the true poses so that both are one at the scan FIRST, and says how far they drift apart from there. `align` and
+aligns the true poses with the found ones at the scan FIRST, and prints the drift from there. `align` and
 `compare` exit with 1 beyond the bounds below.
 """
 
@@ -20,13 +20,13 @@ from rosbags.typesys import Stores
 
 START_NS = 1_700_000_000_123_456_789
 PERIOD_NS = 100_000_000
-# KISS-ICP takes it that the car stands when the recording begins. This one drives: the first scans are left out.
+# KISS-ICP assumes that the vehicle is at rest at the beginning. This one moves, so the first scans are left out.
 FIRST = 10
 
-# Of the occupied voxels of each map, so many lie within one and within two voxels of one of the other.
-LEAST_WITHIN = {1: 0.95, 2: 0.98}
-# Of the way driven.
-MOST_DRIFT = 0.01
+# Minimum share of each map's occupied voxels with an occupied voxel of the other map within N voxels.
+MIN_WITHIN = {1: 0.95, 2: 0.98}
+# Maximum drift, as a share of the distance driven.
+MAX_DRIFT = 0.01
 
 
 def read_stream(path):
@@ -45,9 +45,9 @@ def read_stream(path):
 
 
 def headings(positions):
-    """The car looks where it drives: the angle at each position, from those before and after."""
-    way = np.gradient(positions, axis=0)
-    return np.unwrap(np.arctan2(way[:, 1], way[:, 0]))
+    """Yaw at each position, along the trajectory."""
+    steps = np.gradient(positions, axis=0)
+    return np.unwrap(np.arctan2(steps[:, 1], steps[:, 0]))
 
 
 def turn(yaw):
@@ -69,12 +69,12 @@ def record(stream, folder):
     with Writer(folder / "drive.bag") as bag:
         clouds = bag.add_connection("/points", kind, typestore=ros.store)
         for stamp_ns, yaw, xyz, intensity in zip(stamps, yaws, points, intensities):
-            # The stream's points are turned as the world is; the sensor's are turned as the car.
+            # The stream's points are in the axes of the world; the sensor turns with the vehicle.
             in_sensor = xyz.astype(float) @ turn(yaw)
             bag.write(clouds, stamp_ns, ros.serialize(ros.cloud(stamp_ns, in_sensor, intensity), kind))
     (folder / "true_tum.txt").write_text("".join(map(tum, stamps, positions, yaws)))
-    way_m = np.linalg.norm(np.diff(positions, axis=0), axis=1).sum()
-    print(f"{len(yaws)} scans of {np.mean([len(xyz) for xyz in points]):.0f} points, {way_m:.0f} m, ", end="")
+    distance_m = np.linalg.norm(np.diff(positions, axis=0), axis=1).sum()
+    print(f"{len(yaws)} scans of {np.mean([len(xyz) for xyz in points]):.0f} points, {distance_m:.0f} m, ", end="")
     print(f"{np.degrees(np.abs(np.diff(yaws)).sum()):.0f} degrees of turns")
 
 
@@ -94,17 +94,17 @@ def align(true, found, aligned):
             file.write(" ".join([line.split()[0], *(repr(float(x)) for x in [*pose[:3, 3], *xyzw])]) + "\n")
     true, found = true[FIRST:], found[FIRST:]
     off_m = np.linalg.norm(true[:, :3, 3] - found[:, :3, 3], axis=1)
-    way_m = np.linalg.norm(np.diff(true[:, :3, 3], axis=0), axis=1).sum()
+    distance_m = np.linalg.norm(np.diff(true[:, :3, 3], axis=0), axis=1).sum()
     turned = np.trace(np.swapaxes(true[:, :3, :3], 1, 2) @ found[:, :3, :3], axis1=1, axis2=2)
     off_deg = np.degrees(np.arccos(np.clip((turned - 1) / 2, -1, 1)))
     print(f"poses: off by {off_m.mean():.3f} m in the mean, {off_m.max():.3f} m at most, ", end="")
     print(f"{off_deg.max():.2f} degrees at most; ", end="")
-    print(f"{off_m[-1]:.3f} m after {way_m:.0f} m, that is {off_m[-1] / way_m:.2%}")
-    return off_m[-1] > MOST_DRIFT * way_m
+    print(f"{off_m[-1]:.3f} m after {distance_m:.0f} m, that is {off_m[-1] / distance_m:.2%}")
+    return off_m[-1] > MAX_DRIFT * distance_m
 
 
 def quaternion(matrix):
-    """x y z w of a rotation, by the eigenvector that it does not turn in four dimensions."""
+    """Quaternion x y z w of a rotation matrix: eigenvector of the largest eigenvalue of a symmetric 4x4 matrix."""
     (a, b, c), (d, e, f), (g, h, i) = matrix
     symmetric = np.array([
         [a - e - i, b + d, c + g, h - f],
@@ -116,19 +116,19 @@ def quaternion(matrix):
 
 
 def packed(index):
-    """Whole numbers that order as indices do, one a voxel."""
+    """Integers, one per voxel, in the order of the indices."""
     index = index + (1 << 20)
     return (index[:, 0] << 42) | (index[:, 1] << 21) | index[:, 2]
 
 
 def share_within(index, other, voxels):
-    """The share of the voxels that have one of the others at most so many voxels away along every axis."""
+    """Share of the voxels with one of `other` within `voxels` along every axis."""
     steps = range(-voxels, voxels + 1)
     there, near = np.sort(packed(other)), np.zeros(len(index), bool)
     for step in [(x, y, z) for x in steps for y in steps for z in steps]:
-        beside = packed(index + step)
-        at = np.minimum(np.searchsorted(there, beside), len(there) - 1)
-        near |= there[at] == beside
+        neighbour = packed(index + step)
+        at = np.minimum(np.searchsorted(there, neighbour), len(there) - 1)
+        near |= there[at] == neighbour
     return near.mean()
 
 
@@ -136,7 +136,7 @@ def compare(name, true, found, resolution):
     true, found = (np.floor(np.load(path)["xyz"] / resolution).astype(np.int64) for path in (true, found))
     failed = False
     print(f"{name}: {len(found)} voxels occupied, {len(true)} with the true poses; ", end="")
-    for voxels, least in LEAST_WITHIN.items():
+    for voxels, least in MIN_WITHIN.items():
         forth, back = share_within(found, true, voxels), share_within(true, found, voxels)
         print(f"within {voxels}: {forth:.4f} and back {back:.4f}", end="; " if voxels < 2 else "\n")
         failed |= min(forth, back) < least

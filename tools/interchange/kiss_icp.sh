@@ -1,11 +1,11 @@
 #!/bin/sh
-# From a recording without poses to a map: KISS-ICP finds the poses of a simulated drive from its points alone, voxtile
-# maps with them, and the map is compared with that of the true poses.
+# Maps a recording without poses: KISS-ICP estimates the poses of a simulated drive from its points alone, voxtile maps
+# with them, and the map is compared with that of the true poses.
 #
 #   tools/interchange/kiss_icp.sh
 #
-# Needs python3 with venv; its packages go to a temporary folder. VOXTILE_BIN is a folder with a built `voxtile` and
-# `workload`. Exits with 1 if the maps or the poses differ by more than kiss_icp.py allows.
+# Needs python3 with venv; its packages are put into a temporary folder. VOXTILE_BIN is a folder with a built `voxtile`
+# and `workload`. Exits with 1 if the maps or the poses differ by more than kiss_icp.py allows.
 set -eu
 cd "$(dirname "$0")/../.."
 here=tools/interchange
@@ -23,7 +23,7 @@ python3 -m venv "$work/venv"
 "$work/venv/bin/pip" install --quiet --disable-pip-version-check 'kiss-icp>=1.3,<2' numpy rosbags
 python=$work/venv/bin/python
 
-# Down a street, around a corner and on, at 36 km/h: a scan every metre.
+# Along a street and around a corner at 36 km/h: a scan every metre.
 "$VOXTILE_BIN/workload" drive --seed 2 --first 110 --scans 120 --rays 32768 -o "$work/drive.scans"
 "$python" "$here/kiss_icp.py" record "$work/drive.scans" "$work"
 
@@ -36,7 +36,7 @@ tum=$work/kiss_icp/latest/drive_poses_tum.txt
 
 failed=0
 "$python" "$here/kiss_icp.py" align "$work/true_tum.txt" "$kitti" "$work/aligned_tum.txt" || failed=1
-# The scans' own times, but in the log of the recording 40 ms later: KISS-ICP names poses by the log.
+# Poses 40 ms late, as if named by the log time of the recording: KISS-ICP uses log times.
 awk '{ $1 = sprintf("%.4f", $1 + 0.04); print }' "$tum" >"$work/late_tum.txt"
 
 map_with() { # poses, name
@@ -51,7 +51,7 @@ compare() { # poses, name, options
     "$python" "$here/kiss_icp.py" compare "$1" "$work/true.npz" "$work/found.npz" $resolution ${2-} || failed=1
 }
 map_with "$work/aligned_tum.txt" true
-compare "$kitti" "poses_kitti.txt, a line a scan"
+compare "$kitti" "poses_kitti.txt, one line per scan"
 compare "$tum" "poses_tum.txt, by time"
 compare "$work/late_tum.txt" "poses_tum.txt, logged 40 ms late" --shown-only
 exit $failed

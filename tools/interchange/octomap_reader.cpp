@@ -1,4 +1,4 @@
-// Prints the centers of the occupied voxels of a .bt or .ot file as OctoMap has them: `x y z`, in no stated order.
+// Prints the centers of the occupied voxels of a .bt or .ot file as read by OctoMap: `x y z`, in unspecified order.
 #include <cstdio>
 #include <cstring>
 #include <memory>

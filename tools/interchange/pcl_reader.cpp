@@ -1,4 +1,4 @@
-// Prints the points of a PCD file as PCL has them: `x y z intensity`, after the viewpoint.
+// Prints the points of a PCD file as read by PCL: `x y z intensity`, after the viewpoint.
 #include <cstdio>
 #include <pcl/io/pcd_io.h>
 #include <pcl/point_types.h>

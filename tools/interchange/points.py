@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Prints the points of a file as a Python library has them: `x y z`, after `# origin X Y Z` where the library tells it.
+"""Prints the points of a file as read by a Python library: `x y z`, after `# origin X Y Z` if the library returns it.
 
     points.py plyfile|pypcd4|open3d FILE
 """

@@ -1,11 +1,11 @@
-"""Messages of ROS 1 and ROS 2 as `rosbags` makes them."""
+"""Messages of ROS 1 and ROS 2 made with `rosbags`."""
 
 import numpy as np
 from rosbags.typesys import get_types_from_msg, get_typestore
 
 
 class Ros:
-    """Makes and serializes the messages of one ROS."""
+    """Makes and serializes the messages of one ROS version."""
 
     def __init__(self, store, has_sequence):
         self.store, self.has_sequence = get_typestore(store), has_sequence

@@ -1,13 +1,13 @@
 #!/bin/sh
-# Other programs read what `voxtile export` writes: PCL, plyfile, pypcd4 and OctoMap, and without --short Open3D and
-# CloudCompare, too. Near the origin and far from it (UTM, ECEF), every point must come back to its voxel.
+# Reads the output of `voxtile export` with other programs: PCL, plyfile, pypcd4 and OctoMap, and without --short also
+# Open3D and CloudCompare. Every point must be read back in its voxel, near the origin and far from it (UTM, ECEF).
 #
 #   tools/interchange/run.sh [--short]
 #
-# Needs python3 with venv, and of Debian: g++, libeigen3-dev, libboost-dev, libpcl-io (the library alone; PCL's headers are
-# unpacked to a temporary folder, for libpcl-dev brings a gigabyte), liboctomap-dev; without --short cloudcompare and
-# python3-open3d too. Installs nothing but plyfile and pypcd4, into a temporary folder. VOXTILE_BIN is a
-# folder of programs that are built already. Exits with 1 if a comparison fails.
+# Needs python3 with venv, and from Debian: g++, libeigen3-dev, libboost-dev, libpcl-io (the library only; PCL's headers
+# are unpacked to a temporary folder, as libpcl-dev needs a gigabyte), liboctomap-dev; without --short also cloudcompare
+# and python3-open3d. Installs only plyfile and pypcd4, into a temporary folder. VOXTILE_BIN is a folder of built
+# programs. Exits with 1 if a comparison fails.
 set -eu
 cd "$(dirname "$0")/../.."
 here=tools/interchange
@@ -22,7 +22,7 @@ python3 -m venv "$work/venv"
 "$work/venv/bin/pip" install --quiet --disable-pip-version-check plyfile pypcd4
 python=$work/venv/bin/python
 
-# So that the package manager, which may fetch as another user, can write there.
+# The package manager may download as another user, who must be able to write there.
 chmod 755 "$work" && mkdir -m 777 "$work/pcl"
 (cd "$work/pcl" && apt-get download -qq libpcl-dev >/dev/null && dpkg -x libpcl-dev_*.deb .)
 library() { # name without its version
@@ -35,11 +35,11 @@ g++ -std=c++17 -O1 -w "$here/octomap_reader.cpp" -o "$work/octomap_reader" -loct
 failed=0
 resolution=0.2
 
-compare() { # table, file, who, options; the points come from standard input
+compare() { # table, file, program, options; reads points from standard input
     python3 "$here/compare.py" "$1" $resolution "$2" "$3" ${4-} || failed=1
 }
 
-# What a scan of a map near the origin is far from it: the occupied voxels, seen from above.
+# Builds a map far from the origin: the occupied voxels of the near map, seen from above.
 far_map() { # name, x, y, z
     cloud=$work/$1.pcd
     {
@@ -81,7 +81,7 @@ for map in near utm ecef; do
     for format in pcd ply; do
         /usr/bin/python3 "$here/points.py" open3d "$work/$map.$format" | compare "$table" "$work/$map.$format" Open3D
     done
-    # Debian's CloudCompare has no reader of .pcd. It has float32 inside, and shifts what is far away by itself.
+    # Debian's CloudCompare cannot read .pcd. It stores float32, and shifts distant points by itself.
     QT_QPA_PLATFORM=offscreen timeout 120 CloudCompare -SILENT -NO_TIMESTAMP -C_EXPORT_FMT ASC -PREC 12 -SEP SPACE -AUTO_SAVE OFF \
         -O -GLOBAL_SHIFT AUTO "$work/$map.ply" -SAVE_CLOUDS FILE "$work/read.asc" >"$work/cc.log" 2>&1 || tail -5 "$work/cc.log"
     touch "$work/read.asc"

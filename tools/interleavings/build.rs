@@ -1,4 +1,4 @@
-//! Takes the sources that have threads as they are, with the scheduler's locks, channels and threads for those of the
+//! Copies the sources that use threads, with the scheduler's locks, channels and threads in place of those of the
 //! standard library.
 
 use std::path::Path;
@@ -42,17 +42,17 @@ const SOURCES: [&str; 33] = [
 
 fn main() {
     let sources = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../src");
-    let out = env::var_os("OUT_DIR").expect("cargo names a folder");
+    let out = env::var_os("OUT_DIR").expect("cargo sets OUT_DIR");
     for source in SOURCES {
         let path = sources.join(source);
         println!("cargo::rerun-if-changed={}", path.display());
         let text = fs::read_to_string(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
         let code = text.split("#[cfg(test)]\nmod tests {").next().unwrap_or_default();
-        // What is included cannot begin with a module's own documentation.
+        // An included file cannot begin with module documentation.
         let code: String =
             code.lines().filter(|line| !line.starts_with("//!")).flat_map(|line| [line, "\n"]).collect();
         let code = code.replace("std::sync", "shuttle::sync").replace("std::thread", "shuttle::thread");
         let name = path.file_name().expect("a source has a name");
-        fs::write(Path::new(&out).join(name), code).expect("the folder can be written to");
+        fs::write(Path::new(&out).join(name), code).expect("OUT_DIR is writable");
     }
 }

@@ -11,13 +11,13 @@
 
 static const double MAX_RANGE_M = 60.0;
 static const double TOLERANCE = 1e-3;
-static const double LEAST_PERCENT = 99.99;
+static const double MIN_PERCENT = 99.99;
 
 static bool read_floats(std::istream& in, float* values, size_t count) {
   return bool(in.read(reinterpret_cast<char*>(values), std::streamsize(count * sizeof(float))));
 }
 
-// One scan of the stream; false at its end.
+// Reads one scan of the stream; returns false at its end.
 static bool read_scan(std::istream& in, octomap::point3d& origin, octomap::Pointcloud& cloud) {
   uint32_t count;
   if (!in.read(reinterpret_cast<char*>(&count), 4)) return false;
@@ -33,7 +33,7 @@ static bool read_scan(std::istream& in, octomap::point3d& origin, octomap::Point
   return true;
 }
 
-// How many finest voxels the tree knows.
+// Number of finest voxels in the tree.
 static uint64_t finest_voxels(const octomap::OcTree& tree) {
   uint64_t voxels = 0;
   for (auto leaf = tree.begin_leafs(), end = tree.end_leafs(); leaf != end; ++leaf)
@@ -76,7 +76,7 @@ static Counts compare(const octomap::OcTree& tree, const std::string& map, uint6
       }
     }
   }
-  // Every voxel of the table was looked up, so the rest of the tree is OctoMap's alone.
+  // Every voxel of the table was looked up, so only OctoMap has the rest of the tree.
   const uint64_t both = counts.agree + counts.other_class + counts.other_value;
   counts.only_octomap = finest_voxels(tree) - both;
   return counts;
@@ -136,7 +136,7 @@ int main(int argc, char** argv) try {
               (unsigned long)counts.agree, (unsigned long)counts.other_class, (unsigned long)counts.other_value,
               (unsigned long)counts.only_octomap, (unsigned long)counts.only_voxtile, counts.largest_difference,
               percent, seconds);
-  return percent >= LEAST_PERCENT ? 0 : 1;
+  return percent >= MIN_PERCENT ? 0 : 1;
 } catch (const std::exception& error) {
   std::fprintf(stderr, "insert: %s\n", error.what());
   return 2;

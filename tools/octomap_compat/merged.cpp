@@ -1,4 +1,4 @@
-// Compares the files of a whole map, byte for byte, with what OctoMap makes of its tables.
+// Compares the files of a whole map, byte for byte, with those that OctoMap writes from its tables.
 //
 //   merged MAP RESOLUTION OURS.bt OURS.ot      exits with 1 if one differs
 #include "voxtile_map.hpp"
@@ -18,13 +18,13 @@ int main(int argc, char** argv) try {
     return 2;
   }
   octomap::OcTree tree(std::stod(argv[2]));
-  // setNodeValue works on the default clamps, which are the map's; nothing is clamped anew.
+  // setNodeValue applies the default clamps, which equal the map's; no value changes.
   for (const auto& tile : tile_folders(argv[1]))
     for (const Entry& entry : table(tile)) tree.setNodeValue(entry.key, float(entry.log_odds), true);
   tree.updateInnerOccupancy();
   tree.prune();
   std::stringstream ot, bt;
-  // writeBinary flattens the live tree, so the log-odds go first.
+  // writeBinary flattens the tree, so the log-odds are written first.
   tree.write(ot);
   tree.writeBinary(bt);
   const bool same_ot = is_same("ot", file_bytes(argv[4]), ot.str());

@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
 """Writes the scans of a data folder (scans/*.pcd, poses_tum.txt) as a stream of world points.
 
-    points.py FOLDER [MOST_SCANS] > STREAM
+    points.py FOLDER [MAX_SCANS] > STREAM
 
-Per scan, little-endian: count u32, origin 3 x f32, points 3 x f32 each. The points are rounded to f32 here, so that
-OctoMap, which knows no other, and voxtile map the same ones. Python alone, without numpy: nothing to install.
+Per scan, little-endian: count u32, origin 3 x f32, points 3 x f32 each. The points are rounded to f32, the
+only type that OctoMap supports, so that both map the same points. Needs only Python, without numpy.
 """
 import math
 import pathlib
@@ -14,7 +14,7 @@ from array import array
 
 
 def points_of(path):
-    """The finite points of a binary PCD but the exact (0, 0, 0), which stands for "no return"."""
+    """Yields the finite points of a binary PCD, except (0, 0, 0), which means "no return"."""
     data = path.read_bytes()
     header, at = {}, 0
     while header.get("DATA") is None:
@@ -48,13 +48,13 @@ def rotation(qx, qy, qz, qw):
 
 def main():
     folder = pathlib.Path(sys.argv[1])
-    most = int(sys.argv[2]) if len(sys.argv) > 2 else None
+    max_scans = int(sys.argv[2]) if len(sys.argv) > 2 else None
     lines = (folder / "poses_tum.txt").read_text().splitlines()
     poses = [[float(word) for word in line.split()] for line in lines if line.strip() and line[0] != "#"]
     scans = sorted((folder / "scans").glob("*.pcd"))
     if len(scans) != len(poses):
         sys.exit(f"{folder}: {len(scans)} scans but {len(poses)} poses")
-    for path, (_, tx, ty, tz, *quaternion) in list(zip(scans, poses))[:most]:
+    for path, (_, tx, ty, tz, *quaternion) in list(zip(scans, poses))[:max_scans]:
         (a, b, c), (d, e, f), (g, h, i) = rotation(*quaternion)
         floats = array("f", (tx, ty, tz))
         for x, y, z in points_of(path):

@@ -3,9 +3,9 @@
 #
 #   tools/octomap_compat/run.sh [--short]
 #
-# Needs g++, python3 and liboctomap-dev, and data below ${VOXTILE_DATA:-../shared/data}; a data set that is absent is
-# skipped. --short: the first scans of two data sets at 0.2 m. VOXTILE_BIN is a
-# folder of programs that are built already. Exits with 1 if a comparison fails.
+# Needs g++, python3 and liboctomap-dev, and data below ${VOXTILE_DATA:-../shared/data}; missing data sets are skipped.
+# --short: the first scans of two data sets at 0.2 m. VOXTILE_BIN is a folder of built programs. Exits with 1 if a
+# comparison fails.
 set -eu
 cd "$(dirname "$0")/../.."
 here=tools/octomap_compat
@@ -17,14 +17,14 @@ trap 'rm -rf "$work"' EXIT
 
 [ -n "${VOXTILE_BIN-}" ] || cargo build --release --quiet --example insert_stream --bin voxtile
 for tool in insert tiles merged; do
-    # Without contracted operations, like Debian's library: fused multiply-add visits slightly other voxels.
-    # OctoMap's headers hold the ray walk, so it is compiled here, not only in the library. NDEBUG silences it.
+    # Compiled without fused multiply-add, like Debian's library: it would visit slightly different voxels. The ray walk
+    # is in OctoMap's headers, so it is compiled here. NDEBUG silences it.
     g++ -std=c++17 -O2 -DNDEBUG -ffp-contract=off -Wall -o "$work/$tool" "$here/$tool.cpp" -loctomap -loctomath
 done
 
 failed=0
 
-compare() { # data set, resolution in metres, most scans
+compare() { # data set, resolution in metres, maximum number of scans
     if [ ! -d "$data/$1/scans" ]; then
         echo "$1: skipped, not in $data"
         return
@@ -34,7 +34,7 @@ compare() { # data set, resolution in metres, most scans
     "$bin/examples/insert_stream" "$work/stream" "$2" "$work/map"
     "$work/insert" "$work/stream" "$2" "$work/map" || failed=1
     "$work/tiles" "$work/map" "$2" || failed=1
-    # In little memory, so that the files are put together from many blocks.
+    # Little memory, so that the files are assembled from many blocks.
     for format in bt ot; do
         "$bin/voxtile" export "$work/map" -o "$work/whole.$format" --memory 1MiB > /dev/null
     done

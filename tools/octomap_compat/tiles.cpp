@@ -1,12 +1,12 @@
-// Compares each tile's octree.bt, byte for byte, with what OctoMap's writeBinary makes of the tile's table.
+// Compares each tile's octree.bt, byte for byte, with the output of OctoMap's writeBinary for the tile's table.
 //
 //   tiles MAP RESOLUTION                  all tiles; exits with 1 if one differs
-//   tiles --write TILE RESOLUTION STEM    writes OctoMap's STEM.bt and STEM.ot of one tile folder
+//   tiles --write TILE RESOLUTION STEM    writes OctoMap's STEM.bt and STEM.ot for one tile folder
 #include "voxtile_map.hpp"
 #include <cstdio>
 #include <sstream>
 
-// setNodeValue works on the default clamps, which are the map's; nothing is clamped anew.
+// setNodeValue applies the default clamps, which equal the map's; no value changes.
 static void fill(octomap::OcTree& tree, const std::filesystem::path& tile) {
   for (const Entry& entry : table(tile)) tree.setNodeValue(entry.key, float(entry.log_odds), true);
   tree.updateInnerOccupancy();
@@ -19,7 +19,7 @@ int main(int argc, char** argv) try {
     octomap::OcTree tree(std::stod(argv[3]));
     fill(tree, argv[2]);
     const std::string stem = argv[4];
-    // writeBinary flattens the live tree, so the log-odds go first.
+    // writeBinary flattens the tree, so the log-odds are written first.
     return tree.write(stem + ".ot") && tree.writeBinary(stem + ".bt") ? 0 : 2;
   }
   if (argc != 3) {

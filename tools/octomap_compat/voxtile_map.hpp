@@ -16,7 +16,7 @@ struct Entry {
   double log_odds;
 };
 
-// OctoMap tells std::cerr of every file it reads and writes.
+// OctoMap prints a message to std::cerr for every file that it reads or writes.
 inline void silence_octomap() { std::cerr.setstate(std::ios::failbit); }
 
 inline std::string file_bytes(const std::filesystem::path& path) {
@@ -34,7 +34,7 @@ inline std::vector<std::filesystem::path> tile_folders(const std::filesystem::pa
   return folders;
 }
 
-// Header of 16 bytes (magic, version, count), then entries of 18; what follows is for voxtile alone.
+// Header of 16 bytes (magic, version, count), then entries of 18 bytes; the rest is used by voxtile only.
 inline std::vector<Entry> table(const std::filesystem::path& tile) {
   const std::string bytes = file_bytes(tile / "iwlo_meta.bin");
   uint32_t magic = 0, version = 0;

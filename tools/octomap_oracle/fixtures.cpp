@@ -11,7 +11,7 @@
 
 namespace {
 
-// The same numbers on every machine.
+// Generates the same numbers on every machine.
 class Random {
 public:
     double between(double low, double high) {
@@ -23,7 +23,7 @@ private:
     std::uint64_t state_ = 7;
 };
 
-// A sensor in a room with a box in it, on a ground that is not flat.
+// Points seen from a sensor in a room with wavy walls.
 octomap::Pointcloud scan(Random& random, int points) {
     octomap::Pointcloud cloud;
     for (int k = 0; k < points; ++k) {
@@ -52,7 +52,7 @@ int main(int argc, char** argv) {
         pruned.insertPointCloud(cloud, octomap::point3d(0, 0, 0), pose);
     }
     lazy.updateInnerOccupancy();
-    // A block that is known to the last voxel, so that there is something to prune.
+    // A fully known block, so that there is something to prune.
     for (int x = 0; x < 16; ++x)
         for (int y = 0; y < 16; ++y)
             for (int z = 0; z < 8; ++z)

@@ -1,7 +1,7 @@
-// Writes random trees with the real OctoMap, as files to be read and written again by voxtile.
+// Writes random trees with the OctoMap library, for voxtile to read and rewrite.
 //
 //   roundtrip make FOLDER COUNT   COUNT trees: n.ot, and n.expected.bt (OctoMap's writeBinary of n.ot)
-//   roundtrip own FOLDER          for every n.ours.bt and n.ours.ot there: OctoMap reads and rewrites the same bytes
+//   roundtrip own FOLDER          checks that OctoMap rewrites n.ours.bt and n.ours.ot byte for byte
 
 #include <octomap/octomap.h>
 
@@ -24,7 +24,7 @@ static std::string bytes_of(const std::string& path) {
   return bytes.str();
 }
 
-// Clusters of updates, some of them whole cubes, so that pruning happens; every second tree is not pruned.
+// Adds clusters of updates, some of them whole cubes, so that pruning happens; every second tree is not pruned.
 static void grow(OcTree& tree, std::mt19937& random, bool pruned) {
   auto below = [&](unsigned end) { return unsigned(random() % end); };
   unsigned clusters = below(6), kinds = below(3) ? 5 : 0;
@@ -41,16 +41,16 @@ static void grow(OcTree& tree, std::mt19937& random, bool pruned) {
           if (kind == 1) tree.updateNode(key, below(3) == 0, true);
           if (kind == 2) for (int i = 0; i < 8; ++i) tree.updateNode(key, value > 0, !pruned);
           if (kind == 3 && below(8) != 0) tree.setNodeValue(key, float(below(4)) * 0.4f, !pruned);
-          // Small cubes, alike inside, different among each other, and all occupied: what OctoMap prunes of them
-          // depends on whether there is something to prune among the voxels.
+          // Small occupied cubes of equal voxels that differ from each other: how much OctoMap prunes depends on
+          // whether any voxels can be pruned.
           if (kind == 4) tree.setNodeValue(key, 1.0f + float(x / 2 + 8 * (y / 2) + 64 * (z / 2)), false);
         }
   }
-  // Trees that were lazily updated keep stale inner values unless told otherwise: both occur in files.
+  // Lazily updated trees keep stale inner values unless they are updated. Files have both kinds.
   if (below(2)) tree.updateInnerOccupancy();
   if (pruned) tree.prune();
   else if (tree.size() < 2000 && below(2) && tree.getRoot() && tree.getNumLeafNodes() < 300) {
-    // One more level of unpruned equal children here and there.
+    // One more level of unpruned equal children.
     for (auto it = tree.begin_leafs(); it != tree.end_leafs(); ++it)
       if (it.getDepth() < 16 && below(2)) { tree.expandNode(&*it); break; }
   }
@@ -80,12 +80,12 @@ static int own(const std::string& folder) {
     OcTree tree(1.0);
     std::istringstream bt_in(bt), ot_in(ot);
     if (!tree.readBinary(bt_in) || !tree.writeBinaryConst(bt_again) || bt_again.str() != bt) {
-      std::cout << name << ".ours.bt: OctoMap does not give it back\n";
+      std::cout << name << ".ours.bt: OctoMap rewrites it differently\n";
       ++differing;
     }
     std::unique_ptr<AbstractOcTree> general(AbstractOcTree::read(ot_in));
     if (!general || !general->write(ot_again) || ot_again.str() != ot) {
-      std::cout << name << ".ours.ot: OctoMap does not give it back\n";
+      std::cout << name << ".ours.ot: OctoMap rewrites it differently\n";
       ++differing;
     }
   }

@@ -1,13 +1,15 @@
 #!/bin/sh
-# Compares voxtile's .bt and .ot files with those of the real OctoMap (Debian: liboctomap-dev, g++).
+# Compares voxtile's .bt and .ot files with those of the OctoMap library (Debian: liboctomap-dev, g++).
 #
-#   tools/octomap_oracle/run.sh [COUNT]      COUNT random trees, 500 by default; VOXTILE_BIN is a folder of programs that are built already
+#   tools/octomap_oracle/run.sh [COUNT]      COUNT random trees, 500 by default
+#
+# VOXTILE_BIN is a folder of built programs.
 set -eu
 
 count=${1:-500}
 here=$(cd "$(dirname "$0")" && pwd)
 work=$(mktemp -d)
-# OctoMap tells what it does on stderr: kept out of the way.
+# OctoMap reports its progress on stderr, which is redirected to a log.
 trap 'rm -rf "$work"' EXIT
 
 g++ -std=c++17 -O1 "$here/roundtrip.cpp" -o "$work/roundtrip" -loctomap -loctomath

@@ -1,6 +1,6 @@
-# OctoMap's side of the benchmark `peers`, compiled; tools/bench.sh sources this file.
+# Compiles OctoMap's side of the benchmark `peers`; tools/bench.sh sources this file.
 
-# Sets `version` and `contenders`, the arguments that name the programs.
+# Sets `version`, and `contenders` to the arguments that name the programs.
 octomap_contenders() {
     local missing=()
     command -v g++ >/dev/null || missing+=(g++)
@@ -19,8 +19,8 @@ octomap_contenders() {
     fi
 }
 
-# Without contracted operations, like Debian's library: fused multiply-add visits slightly other voxels. OctoMap's
-# headers hold the ray walk and the insertion, so both are compiled here, not only in the library.
+# Compiled without fused multiply-add, like Debian's library: it would visit slightly different voxels. The ray walk and
+# the insertion are in OctoMap's headers, so both are compiled here.
 compile() { # program, options
     local program=$target/peers/$1
     shift

@@ -3,9 +3,9 @@
 //   octomap_contender STREAM RESOLUTION_M [--scans N] [--max-range M] [--rays]
 //                     [--anywhere POINTS --known POINTS --least-seconds S] [--bt FILE] [--dump FILE]
 //
-// The stream is read into memory first. --rays takes insertPointCloudRays, which knows no max range. In this order:
-// the insertions are timed, the memory is weighed, the questions are timed, the voxels are dumped, writeBinary is timed
-// (it flattens the tree).
+// Reads the whole stream into memory. --rays uses insertPointCloudRays, which has no max range. In this order: times
+// the insertions, measures the memory, times the queries, dumps the voxels, times writeBinary (which flattens the
+// tree).
 #include <algorithm>
 #include <chrono>
 #include <cmath>
@@ -26,7 +26,7 @@ struct Scan {
 
 struct Options {
   std::string stream, anywhere, known, bt, dump;
-  double resolution = 0.0, max_range = -1.0, least_seconds = 0.5;  // A negative range is none.
+  double resolution = 0.0, max_range = -1.0, least_seconds = 0.5;  // A negative range means no limit.
   uint64_t scans = UINT64_MAX;
   bool rays = false;
 };
@@ -49,7 +49,7 @@ static Options options_of(int argc, char** argv) {
   for (int i = 1; i < argc; ++i) {
     const std::string name = argv[i];
     const auto value = [&]() -> std::string {
-      if (++i == argc) throw std::runtime_error(name + " needs a value");
+      if (++i == argc) throw std::runtime_error(name + " requires a value");
       return argv[i];
     };
     if (name == "--rays") options.rays = true;
@@ -60,12 +60,12 @@ static Options options_of(int argc, char** argv) {
     else if (name == "--known") options.known = value();
     else if (name == "--bt") options.bt = value();
     else if (name == "--dump") options.dump = value();
-    else if (name.rfind("--", 0) == 0) throw std::runtime_error(name + ": no such option");
+    else if (name.rfind("--", 0) == 0) throw std::runtime_error(name + ": unknown option");
     else places.push_back(name);
   }
-  if (places.size() != 2) throw std::runtime_error("give STREAM and RESOLUTION_M");
+  if (places.size() != 2) throw std::runtime_error("STREAM and RESOLUTION_M are required");
   if (options.anywhere.empty() != options.known.empty())
-    throw std::runtime_error("--anywhere and --known go together");
+    throw std::runtime_error("--anywhere and --known must be given together");
   options.stream = places[0];
   options.resolution = number(places[1]);
   if (options.resolution <= 0.0) throw std::runtime_error("the resolution must be above 0 m");
@@ -94,13 +94,13 @@ static std::vector<Scan> read_scans(const Options& options) {
     Scan& scan = scans.back();
     bool whole = read_point(in, scan.origin);
     octomap::point3d point;
-    // The count of a damaged stream may be any, so the room made at once is bounded.
+    // The count may be wrong in a damaged stream, so the reserved memory is bounded.
     scan.cloud.reserve(std::min(count, uint32_t(1) << 20));
     for (uint32_t i = 0; whole && i < count; ++i) {
       whole = read_point(in, point);
       scan.cloud.push_back(point);
     }
-    if (!whole) throw std::runtime_error(options.stream + ": ends within a scan; write it anew");
+    if (!whole) throw std::runtime_error(options.stream + ": ends within a scan; write it again");
   }
   return scans;
 }
@@ -123,7 +123,7 @@ static double cpu_s() {
   return double(time.tv_sec) + 1e-9 * double(time.tv_nsec);
 }
 
-// Bytes of memory that the process holds, as Linux tells.
+// Resident memory of the process in bytes, from Linux.
 static int64_t resident_bytes() {
   std::ifstream status = opened("/proc/self/status");
   for (std::string line; std::getline(status, line);)
@@ -131,7 +131,7 @@ static int64_t resident_bytes() {
   throw std::runtime_error("/proc/self/status: no line VmRSS");
 }
 
-// Finest voxels that the tree knows.
+// Number of finest voxels in the tree.
 static uint64_t finest_voxels(const octomap::OcTree& tree) {
   uint64_t voxels = 0;
   for (auto leaf = tree.begin_leafs(), end = tree.end_leafs(); leaf != end; ++leaf)
@@ -139,11 +139,11 @@ static uint64_t finest_voxels(const octomap::OcTree& tree) {
   return voxels;
 }
 
-static Answers ask(const octomap::OcTree& tree, const std::string& path, double least_seconds) {
+static Answers query(const octomap::OcTree& tree, const std::string& path, double least_seconds) {
   const std::vector<octomap::point3d> points = read_points(path);
   Answers answers;
   double seconds = 0.0;
-  uint64_t asked = 0;
+  uint64_t queries = 0;
   do {
     answers.known = answers.occupied = 0;
     const double start = cpu_s();
@@ -154,13 +154,13 @@ static Answers ask(const octomap::OcTree& tree, const std::string& path, double 
       answers.occupied += tree.isNodeOccupied(node);
     }
     seconds += cpu_s() - start;
-    asked += points.size();
+    queries += points.size();
   } while (seconds < least_seconds && !points.empty());
-  answers.ns = asked ? 1e9 * seconds / double(asked) : 0.0;
+  answers.ns = queries ? 1e9 * seconds / double(queries) : 0.0;
   return answers;
 }
 
-// Every finest voxel: index 3 x i32, count i32 (0, as OctoMap has none), log-odds f64. Pruned leaves are expanded.
+// Writes every finest voxel: index 3 x i32, count i32 (0, as OctoMap has none), log-odds f64. Expands pruned leaves.
 static void dump(const octomap::OcTree& tree, const std::string& path) {
   std::ofstream out(path, std::ios::binary);
   for (auto leaf = tree.begin_leafs(), end = tree.end_leafs(); leaf != end; ++leaf) {
@@ -205,8 +205,8 @@ int main(int argc, char** argv) try {
               (unsigned long)scans.size(), cpu, wall, (unsigned long)finest_voxels(tree),
               (unsigned long)tree.memoryUsage(), (unsigned long)resident);
   if (!options.anywhere.empty()) {
-    const Answers anywhere = ask(tree, options.anywhere, options.least_seconds);
-    const Answers known = ask(tree, options.known, options.least_seconds);
+    const Answers anywhere = query(tree, options.anywhere, options.least_seconds);
+    const Answers known = query(tree, options.known, options.least_seconds);
     std::printf(",\"questions\":{");
     print("anywhere", anywhere);
     std::printf(",");

@@ -1,3 +1,3 @@
 #!/usr/bin/env bash
-# One of the benchmarks of tools/bench.sh, whose head tells the options.
+# A benchmark of tools/bench.sh; see there for the options.
 exec "$(dirname "$0")/../bench.sh" peers "$@"

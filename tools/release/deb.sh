@@ -1,8 +1,8 @@
-# Debian packages from the tree of run.sh, which sources this file.
+# Builds Debian packages from the tree of run.sh, which sources this file.
 
 maintainer="${DEBFULLNAME:-The voxtile developers} <${DEBEMAIL:-voxtile@localhost.localdomain}>"
 
-# deb NAME SUMMARY DESCRIPTION FILE...: the files, with those that policy asks for.
+# deb NAME SUMMARY DESCRIPTION FILE...: packages the files, with the documents that Debian policy requires.
 deb() {
     local name=$1 summary=$2 description=$3 root=$work/deb-$1 documents file
     shift 3
@@ -12,14 +12,14 @@ deb() {
         # shellcheck disable=SC2086
         (cd "$tree" && cp --parents --recursive $file "$root/usr/")
     done
-    # A page belongs to one package.
+    # Each manual page belongs to one package.
     [[ $name == voxtile-share ]] || rm -f "$root/usr/share/man/man1/voxtile-share.1"
     find "$root/usr/share/man" -type f -exec gzip --best --no-name {} +
     gzip --best --no-name <CHANGELOG.md >"$documents/changelog.gz"
     debian_changelog "$name" | gzip --best --no-name >"$documents/changelog.Debian.gz"
     gzip --best --no-name <"$tree/share/doc/voxtile/THIRD-PARTY-LICENSES" >"$documents/THIRD-PARTY-LICENSES.gz"
     debian_copyright >"$documents/copyright"
-    # Static, on purpose.
+    # The binaries are static on purpose.
     echo "$name: shared-library-lacks-prerequisites [usr/bin/$name]" >"$root/usr/share/lintian/overrides/$name"
     control "$name" "$summary" "$description" "$(du --summarize --block-size=1K "$root/usr" | cut -f1)" \
         >"$root/DEBIAN/control"
@@ -45,7 +45,7 @@ CONTROL
     *) echo "Enhances: voxtile" ;;
     esac
     echo "Description: $2"
-    # One blank before each line.
+    # Debian requires a blank before each line of a description.
     fold --spaces --width 78 <<<"${3//$'\n'/ }" | sed 's/^/ /; s/ *$//'
 }
 
@@ -68,7 +68,7 @@ It is licensed, at your option, under the Apache License 2.0 (on Debian systems 
 
 $(cat LICENSE-MIT)
 
-The binary holds crates of others, whose licenses are in THIRD-PARTY-LICENSES.gz, and parts of the C library musl
+The binary contains third-party crates, whose licenses are in THIRD-PARTY-LICENSES.gz, and parts of the C library musl
 (MIT license, copyright 2005-2020 Rich Felker and others).
 COPYRIGHT
 }

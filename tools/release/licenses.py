@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
-"""Prints the licenses of all crates that a binary holds: licenses.py TARGET PACKAGE...
+"""Prints the licenses of all crates in a binary: licenses.py TARGET PACKAGE...
 
-Most licenses want their text beside the binary. Crates with the same text are listed together above it.
+Most licenses require their text next to the binary. Crates with the same text are listed together above it.
 """
 
 import json
@@ -10,8 +10,8 @@ import subprocess
 import sys
 
 TEXTS = ("LICENSE", "LICENCE", "COPYING", "COPYRIGHT", "NOTICE", "UNLICENSE")
-GLIBC = """The binaries hold parts of the GNU C library (LGPL-2.1-or-later). The source crate of this release and
-`tools/release/run.sh` make them anew with another version of that library.
+GLIBC = """The binaries contain parts of the GNU C library (LGPL-2.1-or-later). The source crate of this release and
+`tools/release/run.sh` rebuild them with another version of that library.
 """
 
 
@@ -20,18 +20,18 @@ def cargo(*arguments):
 
 
 def crates(target, packages):
-    """Names and versions of the crates of others that the packages link."""
+    """Yields names and versions of the third-party crates that the packages link."""
     selection = [word for package in packages for word in ("--package", package)]
     edges = ["--edges", "normal", "--target", target, "--prefix", "none", "--format", "{p}"]
     for line in set(cargo("tree", "--locked", *selection, *edges).splitlines()):
         words = line.split()
-        # A path behind the version: a crate of this repository.
+        # A path after the version marks a crate of this repository.
         if len(words) >= 2 and not any(word.startswith("(/") for word in words):
             yield words[0], words[1].removeprefix("v")
 
 
 def texts(folder):
-    """The text of each file of a crate that states its license."""
+    """Returns the text of each license file of a crate."""
     paths = sorted(path for path in folder.iterdir() if path.name.upper().startswith(TEXTS) and path.is_file())
     return [path.read_text(encoding="utf-8", errors="replace").strip("\r\n") for path in paths]
 
@@ -43,7 +43,7 @@ def section(names, text):
 def main(target, *packages):
     metadata = json.loads(cargo("metadata", "--locked", "--format-version", "1"))
     known = {(package["name"], package["version"]): package for package in metadata["packages"]}
-    # By the words alone: the same license comes with other line breaks.
+    # Compared by words: the same license occurs with different line breaks.
     named, without = {}, []
     for crate in sorted(set(crates(target, packages))):
         package = known[crate]
@@ -58,7 +58,7 @@ def main(target, *packages):
     for text, names in sorted(named.values(), key=lambda entry: entry[1]):
         print(section(names, text))
     if without:
-        print(section(without, "These crates come without a text of their license; it is named in brackets."))
+        print(section(without, "These crates have no license text; the license is in brackets."))
 
 
 if __name__ == "__main__":

@@ -1,18 +1,18 @@
 #!/usr/bin/env bash
-# Everything that a release hands out, in one folder:
+# Builds everything for a release, in one folder:
 #
 #   voxtile-VERSION-TARGET.tar.gz     static binaries of voxtile and voxtile-share, man pages, completions, licenses
 #   voxtile_VERSION-1_ARCH.deb        the same as Debian packages
 #   voxtile-share_VERSION-1_ARCH.deb
-#   voxtile*-VERSION.crate            the sources of the engine, the command and the crates between, built once more
+#   voxtile*-VERSION.crate            sources of the engine, the command and the crates between, build-tested
 #   SHA256SUMS
 #
 #   tools/release/run.sh [--out FOLDER] [--dirty]
 #
-# --out: the folder, new or made by an earlier run (target/release-VERSION). --dirty: also with changes that are not
-# committed. The binaries are for this machine's kind of CPU. Needs cargo, python3, dpkg-deb, and for static binaries
-# `rustup target add $(uname -m)-unknown-linux-musl` and Debian's musl-tools. DEBFULLNAME and DEBEMAIL name the
-# maintainer of the Debian packages. The same commit and toolchain make the same bytes.
+# --out: the folder, new or written by an earlier run (default: target/release-VERSION). --dirty: allow uncommitted
+# changes. The binaries are for the CPU architecture of this machine. Needs cargo, python3, dpkg-deb, and for static
+# binaries `rustup target add $(uname -m)-unknown-linux-musl` and Debian's musl-tools. DEBFULLNAME and DEBEMAIL name the
+# maintainer of the Debian packages. The same commit and toolchain give the same bytes.
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 
@@ -23,7 +23,7 @@ while [[ $# -gt 0 ]]; do
     case $1 in
     --out) out=${2:?--out needs a folder} && shift ;;
     --dirty) dirty=(--allow-dirty) ;;
-    *) fail "unknown argument $1; the head of $0 tells the arguments" ;;
+    *) fail "unknown argument $1; see the head of $0" ;;
     esac
     shift
 done
@@ -37,22 +37,22 @@ version=$(cargo metadata --no-deps --locked --format-version 1 | python3 -c \
     'import json, sys; print(next(p["version"] for p in json.load(sys.stdin)["packages"] if p["name"] == "voxtile"))')
 arch=$(dpkg --print-architecture)
 out=${out:-$built/release-$version}
-[[ ! -e $out || -e $out/SHA256SUMS ]] || fail "$out: there is something else already; name another folder with --out"
-# Times of files in the archives.
+[[ ! -e $out || -e $out/SHA256SUMS ]] || fail "$out: already exists; choose another folder with --out"
+# Time stamp of the files in the archives.
 SOURCE_DATE_EPOCH=$(git log -1 --format=%ct)
 export SOURCE_DATE_EPOCH
 
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 
-# Leaves the machine's paths out of the binaries.
+# Removes paths of this machine from the binaries.
 export RUSTFLAGS="--remap-path-prefix=$PWD=voxtile --remap-path-prefix=${CARGO_HOME:-$HOME/.cargo}=cargo"
 cargo build --profile dist --locked --target "$target" --package voxtile-cli --package voxtile-share-node --bins
 unset RUSTFLAGS
 # shellcheck disable=SC2046
 cargo package --locked $(tools/release/published.sh) "${dirty[@]}"
 
-# What is installed, as below /usr.
+# The installed files, relative to /usr.
 tree=$work/voxtile-$version-$target
 voxtile=$tree/bin/voxtile
 install -D -t "$tree/bin" "$built/$target/dist/voxtile" "$built/$target/dist/voxtile-share"

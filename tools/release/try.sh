@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Unpacks an archive of tools/release/run.sh elsewhere and works with its binaries, as their users do: try.sh ARCHIVE
+# Unpacks an archive of tools/release/run.sh into a temporary folder and runs its binaries there: try.sh ARCHIVE
 set -euo pipefail
 archive=$(realpath "$1")
 place=$(mktemp -d)
@@ -8,7 +8,7 @@ cd "$place"
 tar --extract --gzip --strip-components 1 --file "$archive"
 
 for program in voxtile voxtile-share; do
-    # Nothing to load, so that it runs on every Linux of this kind of CPU.
+    # Static, so that it runs on every Linux of this CPU architecture.
     if readelf --program-headers "bin/$program" | grep -q INTERP; then
         echo "release: $program is not static" >&2
         exit 1
@@ -16,7 +16,7 @@ for program in voxtile voxtile-share; do
     echo "$program: $(stat --format=%s "bin/$program") bytes, $("bin/$program" --version)"
 done
 
-# No repository, no cargo, no library of this machine: a root of its own, where that is allowed.
+# Runs without the repository, cargo and the libraries of this machine: in a chroot if permitted.
 run() { env --ignore-environment PATH="$place/bin" "$@"; }
 if unshare --map-root-user true 2>/dev/null; then
     mkdir --parents tmp
@@ -38,4 +38,4 @@ run voxtile build . -o map --poses identity >/dev/null
 run voxtile digest map
 man --warnings --local-file share/man/man1/voxtile-build.1 >/dev/null 2>&1 || ! command -v man >/dev/null
 bash -n share/bash-completion/completions/voxtile
-echo "release: the binaries map, verify and export"
+echo "release: the binaries build, verify and export maps"

@@ -2,24 +2,24 @@ use std::sync::{Mutex, PoisonError};
 use std::thread;
 use std::time::{Duration, Instant};
 
-/// A device that moves so many bytes a second, in whichever direction, and no more.
+/// A simulated device that transfers `bytes_per_s`, reads and writes together.
 #[derive(Debug)]
 pub struct Bucket {
     bytes_per_s: f64,
-    /// When the device will be done with all that it was given.
+    /// Time at which all requested transfers are complete.
     done: Mutex<Instant>,
 }
 
-/// How far the device may be behind before who gave it bytes has to wait: shorter sleeps are not exact.
+/// Delay below which [`Bucket::take`] does not wait: shorter sleeps are inexact.
 const SLACK: Duration = Duration::from_millis(2);
 
 impl Bucket {
-    /// A device with nothing to do.
+    /// Creates an idle device.
     pub fn new(bytes_per_s: f64) -> Self {
         Self { bytes_per_s, done: Mutex::new(Instant::now()) }
     }
 
-    /// Gives the device so many bytes, and waits unless it will be done in an instant.
+    /// Transfers bytes, and waits if the device is more than [`SLACK`] behind.
     pub fn take(&self, bytes: usize) {
         let needed = Duration::from_secs_f64(bytes as f64 / self.bytes_per_s);
         let done = {
@@ -30,7 +30,7 @@ impl Bucket {
         wait_until(done, SLACK);
     }
 
-    /// Waits until the device is done with all that it was given.
+    /// Waits until all transfers are complete.
     pub fn drain(&self) {
         let done = *self.done.lock().unwrap_or_else(PoisonError::into_inner);
         wait_until(done, Duration::ZERO);
@@ -49,7 +49,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_two_threads_give_takes_as_long_as_if_one_did() {
+    fn two_threads_share_the_speed() {
         let bucket = Bucket::new(1e6);
         let begin = Instant::now();
         thread::scope(|scope| {
@@ -58,12 +58,12 @@ mod tests {
             }
         });
         bucket.drain();
-        // Nothing limits how long a busy machine sleeps.
+        // A busy machine may sleep longer.
         assert!(begin.elapsed() >= Duration::from_millis(49), "{:?}", begin.elapsed());
     }
 
     #[test]
-    fn a_device_with_nothing_to_do_saves_nothing_up() {
+    fn idle_time_is_not_saved_up() {
         let bucket = Bucket::new(1e6);
         thread::sleep(Duration::from_millis(20));
         let begin = Instant::now();

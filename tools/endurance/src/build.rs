@@ -15,42 +15,42 @@ use voxtile::{InMemoryMapper, MapPath, MapQueries, MapReader, Mapper, OutOfCoreT
 /// A map to build, scan by scan and with one flush at the end.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Build {
-    /// Of what.
+    /// Scans and map settings.
     pub case: Case,
-    /// In how much memory.
+    /// Memory limit.
     pub limit: Limit,
-    /// On how fast a disk.
+    /// Disk speed.
     pub disk: DiskSpeed,
-    /// How its tiles are stored there.
+    /// Storage of the tiles.
     pub storage: Storage,
-    /// How many scans are made or read before they are inserted one after another: what is done by other threads while
-    /// scans are made is not in the wall time.
+    /// Number of scans that are generated or read before they are inserted one after another. The wall time excludes
+    /// work that other threads do while scans are generated.
     pub scans_at_a_time: usize,
     /// Folder of the map, which is replaced.
     pub folder: PathBuf,
-    /// Whether the map stays there.
+    /// Whether the map is kept on disk.
     pub is_kept: bool,
-    /// Whether the digest is wanted.
+    /// Whether the digest is computed.
     pub has_digest: bool,
-    /// Flushes on the way, beside the one at the end.
+    /// Flushes during the build, in addition to the one at the end.
     pub flushes: Option<Flushes>,
 }
 
-/// Flushes while scans come.
+/// Flushes during a build.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Flushes {
-    /// How many scans come between two; the next begins once the last has ended.
+    /// Number of scans between two flushes; the next one begins after the previous one has ended.
     pub every_scans: usize,
-    /// How much later each scan comes than the one before, in seconds; 0 as soon as it can be taken.
+    /// Interval between scans, in seconds; 0 inserts without waiting.
     pub period_s: f64,
-    /// Whether scans go on meanwhile.
-    pub is_beside: bool,
+    /// Whether scans are inserted during a flush.
+    pub is_background: bool,
 }
 
-/// A map that was built.
+/// Result of a build.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct Built {
-    /// What each scan took, in their order.
+    /// Cost of each scan, in order.
     pub scans: Vec<ScanCost>,
     /// Wall time of the flush at the end, in seconds.
     pub flush_wall_s: f64,
@@ -62,45 +62,45 @@ pub struct Built {
     pub peak_resident_bytes: u64,
     /// Tiles of the map.
     pub tiles: u64,
-    /// Bytes of memory in the tiles that were in memory after the last scan.
+    /// Bytes of the tiles in memory after the last scan.
     pub tile_bytes: u64,
     /// Bytes of the map's files after the flush.
     pub map_file_bytes: u64,
-    /// Bytes read from the disk, of whatever files.
+    /// Bytes read from the disk, from any file.
     pub bytes_read: u64,
-    /// Bytes written to the disk, of whatever files.
+    /// Bytes written to the disk, to any file.
     pub bytes_written: u64,
-    /// Tiles read.
+    /// Number of tiles read.
     pub loads: u64,
-    /// Tiles written.
+    /// Number of tiles written.
     pub saves: u64,
-    /// The digest of the map, in hexadecimal digits; empty if it was not wanted.
+    /// The digest of the map, in hexadecimal digits; empty if not requested.
     pub digest: String,
 }
 
-/// What inserting a scan took.
+/// Cost of inserting a scan.
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub struct ScanCost {
-    /// How far the sensor had come along its way, in metres.
+    /// Distance that the sensor has travelled, in metres.
     pub distance_m: f64,
-    /// Wall time of the call.
+    /// Wall time of the insertion.
     pub wall_ms: f64,
-    /// CPU time of all threads since the scan before, less that of making the scan.
+    /// CPU time of all threads since the previous scan, without that of generating the scan.
     pub cpu_ms: f64,
     /// Resident memory of the process after the call, in bytes.
     pub resident_bytes: u64,
-    /// Bytes written to the disk since the map was opened.
+    /// Bytes written to the disk since the map was created.
     pub bytes_written: u64,
-    /// Wall time of the call that flushed after it; 0 if none did.
+    /// Wall time of the flush call that followed; 0 without a flush.
     pub flush_ms: f64,
 }
 
 impl Build {
-    /// Builds it in this process.
+    /// Builds the map in this process.
     ///
     /// # Errors
     ///
-    /// Scans that cannot be read, a folder that cannot be replaced, a map that cannot be made.
+    /// Fails if scans cannot be read, the folder cannot be replaced or the map cannot be created.
     pub fn run(self) -> Result<Built> {
         let config = self.case.config(self.limit)?.with_storage(self.storage);
         let disk = MeteredDisk::new(self.disk);
@@ -119,7 +119,7 @@ impl Build {
         built.map_file_bytes = file_bytes(&self.folder)?;
         drop(mapper);
         if self.has_digest {
-            // Not by way of the slow disk: this is no part of what is measured.
+            // Bypasses the slow disk: the digest is not part of the measurement.
             built.digest = MapReader::open(&self.folder, 0)?.digest()?.to_string();
         }
         if !self.is_kept {
@@ -128,7 +128,7 @@ impl Build {
         Ok(built)
     }
 
-    /// `flush` flushes in one of two ways, and tells whether it did.
+    /// `flush` starts or does a flush, and returns whether it did.
     fn insert_all<M: Mapper>(
         &self,
         mapper: &mut M,
@@ -137,7 +137,7 @@ impl Build {
     ) -> Result<Built> {
         let mut built = Built { start_resident_bytes: process_memory::resident_bytes()?, ..Built::default() };
         let mut scans = self.case.scans()?;
-        let mut way = Way::default();
+        let mut odometer = Odometer::default();
         let mut since_last = Stopwatch::start()?;
         let (begun, mut unflushed) = (Instant::now(), 0);
         loop {
@@ -166,7 +166,7 @@ impl Build {
                     }
                 }
                 built.scans.push(ScanCost {
-                    distance_m: way.to(scan),
+                    distance_m: odometer.to(scan),
                     wall_ms: 1e3 * took.wall_s,
                     cpu_ms: 1e3 * (took.cpu_s() + others_s + flush_cpu_s),
                     resident_bytes: process_memory::resident_bytes()?,
@@ -205,9 +205,9 @@ impl Built {
     }
 }
 
-/// Flushes, unless an earlier flush goes on beside.
+/// Flushes, unless a background flush is still running.
 fn flush(mapper: &mut OutOfCoreTileMapper, flushes: Flushes) -> Result<bool> {
-    if !flushes.is_beside {
+    if !flushes.is_background {
         mapper.flush()?;
     } else if mapper.is_flushing() {
         return Ok(false);
@@ -217,14 +217,14 @@ fn flush(mapper: &mut OutOfCoreTileMapper, flushes: Flushes) -> Result<bool> {
     Ok(true)
 }
 
-/// How far a sensor has come.
+/// Travelled distance of a sensor.
 #[derive(Default)]
-struct Way {
+struct Odometer {
     last: Option<[f64; 3]>,
     length_m: f64,
 }
 
-impl Way {
+impl Odometer {
     fn to(&mut self, scan: &Scan) -> f64 {
         if let Some(last) = self.last.replace(scan.origin) {
             self.length_m += (0..3).map(|k| (scan.origin[k] - last[k]).powi(2)).sum::<f64>().sqrt();
@@ -233,18 +233,18 @@ impl Way {
     }
 }
 
-/// Makes room for a map's folder: what is there from before goes.
+/// Removes an old map folder and creates its parent.
 fn replace_folder(folder: &Path) -> Result<()> {
     remove_folder(folder)?;
     let parent = folder.parent().unwrap_or(folder);
     fs::create_dir_all(parent).with_context(|| format!("{}: cannot make the folder", parent.display()))
 }
 
-/// Removes a folder and all in it, if it is there.
+/// Removes a folder with its content, if it exists.
 ///
 /// # Errors
 ///
-/// A folder that cannot be removed.
+/// Fails if the folder cannot be removed.
 pub fn remove_folder(folder: &Path) -> Result<()> {
     if folder.exists() {
         fs::remove_dir_all(folder).with_context(|| format!("{}: cannot remove", folder.display()))?;
@@ -252,7 +252,7 @@ pub fn remove_folder(folder: &Path) -> Result<()> {
     Ok(())
 }
 
-/// Bytes of all files in a folder and in the folders in it.
+/// Bytes of all files in a folder, recursively.
 fn file_bytes(folder: &Path) -> Result<u64> {
     let mut bytes = 0;
     for entry in fs::read_dir(folder).with_context(|| format!("{}: cannot read", folder.display()))? {
@@ -270,7 +270,7 @@ mod tests {
     use workload::SurveyName;
 
     fn build(limit: Limit, folder: &Path) -> Built {
-        let input = Input::MadeUp { survey: SurveyName::Drive, rays: 500, scans: 5 };
+        let input = Input::Synthetic { survey: SurveyName::Drive, rays: 500, scans: 5 };
         let case =
             Case { name: "drive".into(), input, resolution_m: 0.4, tile_size_m: 4.0, max_range_m: 30.0 };
         let folder = folder.join("map");
@@ -289,7 +289,7 @@ mod tests {
     }
 
     #[test]
-    fn a_build_on_disk_is_the_build_in_memory_and_its_bytes_are_counted() {
+    fn a_build_on_disk_equals_the_build_in_memory_and_counts_bytes() {
         let folder = tempfile::tempdir().unwrap();
         let in_memory = build(Limit::InMemory, folder.path());
         let on_disk = build(Limit::None, folder.path());

@@ -5,73 +5,73 @@ use voxtile::{MapConfig, MemoryLimit, Scan};
 use voxtile_formats::{ReadOptions, open_scans};
 use workload::SurveyName;
 
-/// Scans, and the map that is made of them.
+/// Scans, and the settings of the map built from them.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Case {
-    /// What tables and plots call it.
+    /// Name in tables and plots.
     pub name: String,
-    /// Where the scans come from.
+    /// Source of the scans.
     pub input: Input,
     /// Edge of a voxel, in metres.
     pub resolution_m: f64,
     /// Edge of a tile, in metres.
     pub tile_size_m: f64,
-    /// Rays are cut at this many metres.
+    /// Maximum range: longer rays are cut, in metres.
     pub max_range_m: f64,
 }
 
-/// Where scans come from.
+/// Source of scans.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub enum Input {
-    /// From a made-up survey.
-    MadeUp {
-        /// Which one.
+    /// From a synthetic survey.
+    Synthetic {
+        /// The survey.
         survey: SurveyName,
-        /// Rays of a scan, more or less.
+        /// Approximate number of rays of a scan.
         rays: u32,
-        /// How many scans.
+        /// Number of scans.
         scans: usize,
     },
-    /// From a made-up survey, one scan in so many of it.
+    /// Every n-th scan of a synthetic survey.
     EveryNth {
-        /// Which one.
+        /// The survey.
         survey: SurveyName,
-        /// Rays of a scan, more or less.
+        /// Approximate number of rays of a scan.
         rays: u32,
-        /// How many scans.
+        /// Number of scans.
         scans: usize,
-        /// How many scans of the survey one is taken of.
+        /// Step between used scans of the survey.
         every: usize,
     },
     /// From a folder of recorded scans and poses.
     Recorded {
-        /// Which one.
+        /// The folder.
         folder: PathBuf,
     },
 }
 
-/// How much memory a map may take.
+/// Memory limit of a map.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Limit {
-    /// It lives in memory, and never gets to the disk.
+    /// The map is in memory and is never written to disk.
     InMemory,
-    /// It is out of core, and all of it fits.
+    /// The map is out of core, with a limit above its size.
     None,
-    /// It is out of core, with so many bytes for all that grows.
+    /// The map is out of core, with a limit in bytes for all that grows.
     Bytes(usize),
 }
 
-/// Seed of the made-up surveys.
+/// Seed of the synthetic surveys.
 const SEED: u64 = 1;
-/// More than any map here takes.
+/// Larger than any map here.
 const UNLIMITED_BYTES: usize = 1 << 44;
 
 impl Case {
-    /// How the map is made.
+    /// Returns the settings of the map.
     ///
     /// # Errors
     ///
-    /// Lengths that make no grid.
+    /// Fails for lengths that do not form a grid.
     pub fn config(&self, limit: Limit) -> Result<MapConfig> {
         let config = MapConfig::new(self.resolution_m, self.tile_size_m)?.with_range(0.0, self.max_range_m);
         Ok(match limit {
@@ -81,7 +81,7 @@ impl Case {
         })
     }
 
-    /// The least limit that a map of this kind keeps to, in bytes.
+    /// The smallest memory limit that a map with these settings accepts, in bytes.
     ///
     /// # Errors
     ///
@@ -90,27 +90,27 @@ impl Case {
         Ok(MemoryLimit::min_bytes(&self.config(Limit::InMemory)?.grid))
     }
 
-    /// Whether the scans follow each other along a way, so that its length says how far the map has come.
+    /// Returns whether the scans follow a trajectory, so that its length measures progress.
     pub fn is_way(&self) -> bool {
         match &self.input {
-            Input::MadeUp { survey, .. } | Input::EveryNth { survey, .. } => survey.spacing_m().is_some(),
+            Input::Synthetic { survey, .. } | Input::EveryNth { survey, .. } => survey.spacing_m().is_some(),
             Input::Recorded { .. } => true,
         }
     }
 
-    /// The scans in their order, made or read one at a time.
+    /// Returns the scans in order, generated or read one at a time.
     ///
     /// # Errors
     ///
-    /// A folder that cannot be read; and its scans, one by one.
+    /// Fails if the folder cannot be read; each scan that cannot be read is an error too.
     pub fn scans(&self) -> Result<Box<dyn Iterator<Item = Result<Scan>>>> {
         match &self.input {
-            Input::MadeUp { survey, rays, scans } => Ok(Box::new(
+            Input::Synthetic { survey, rays, scans } => Ok(Box::new(
                 survey.scans(SEED, 0, *rays).take(*scans).map(|scan| Ok(without_intensities(scan))),
             )),
             Input::EveryNth { survey, rays, scans, every } => {
                 let (survey, rays, every) = (*survey, *rays, *every);
-                // Each by its number: those between are not made.
+                // Generates each scan by its number, not those between.
                 let scan = move |k: usize| survey.scans(SEED, every.saturating_mul(k), rays).next();
                 Ok(Box::new((0..*scans).filter_map(scan).map(|scan| Ok(without_intensities(scan)))))
             }
@@ -126,10 +126,10 @@ impl Case {
         }
     }
 
-    /// What is mapped, in words.
+    /// Description of the scans and the map.
     pub fn description(&self) -> String {
         let input = match &self.input {
-            Input::MadeUp { survey, rays, scans } => match survey.spacing_m() {
+            Input::Synthetic { survey, rays, scans } => match survey.spacing_m() {
                 Some(spacing_m) => {
                     format!("`{}`, {rays} rays, {:.0} m", survey.name(), *scans as f64 * spacing_m)
                 }
@@ -146,7 +146,7 @@ impl Case {
     }
 }
 
-/// Log-odds need none, and they would be most of what a scan takes beside its points.
+/// Drops intensities: log-odds do not need them, and they would take most memory of a scan after its points.
 fn without_intensities(scan: Scan) -> Scan {
     Scan { intensities: None, ..scan }
 }
@@ -156,8 +156,8 @@ mod tests {
     use super::*;
 
     #[test]
-    fn scans_are_as_many_as_asked_and_a_folder_that_is_not_there_is_an_error() {
-        let input = Input::MadeUp { survey: SurveyName::Drive, rays: 200, scans: 3 };
+    fn scans_have_the_requested_number_and_a_missing_folder_is_an_error() {
+        let input = Input::Synthetic { survey: SurveyName::Drive, rays: 200, scans: 3 };
         let drive =
             Case { name: "drive".into(), input, resolution_m: 0.2, tile_size_m: 10.0, max_range_m: 60.0 };
         let scans: Vec<Scan> = drive.scans().unwrap().collect::<Result<_>>().unwrap();

@@ -8,29 +8,29 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use voxtile::{MapReader, MapView, Mapper, OutOfCoreTileMapper, Storage};
 
-/// A robot that goes the same rounds all day: scan after scan of a small map, with flushes beside them.
+/// A robot that repeats the same round all day: many scans of a small map, with background flushes.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Day {
     /// The scans.
     pub case: Case,
-    /// Bytes for all that grows.
+    /// Memory limit in bytes, for all that grows.
     pub memory_bytes: usize,
     /// How the tiles are stored.
     pub storage: Storage,
-    /// How many scans come between two flushes.
+    /// Number of scans between two flushes.
     pub flush_every_scans: usize,
-    /// How many scans make one part of the day.
+    /// Number of scans in one part of the day.
     pub scans_per_part: usize,
-    /// Folder of the map, which must not exist and is removed again.
+    /// Folder of the map. It must not exist, and is removed at the end.
     pub folder: PathBuf,
 }
 
-/// What a part of the day took, and what there was at its end.
+/// Costs of a part of the day, and state at its end.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Part {
     pub scans: u64,
     pub flushes: u64,
-    /// Mean CPU time of a scan, all threads and the flushes among it.
+    /// Mean CPU time of a scan, with all threads and flushes.
     pub cpu_ms: f64,
     /// Wall time of the calls that insert a scan.
     pub median_ms: f64,
@@ -40,71 +40,73 @@ pub struct Part {
     pub begin_flush_ms: f64,
     /// Largest resident memory of the process after a scan, in bytes.
     pub resident_bytes: u64,
-    /// Most files and folders in the map's folder, looked at when a flush had begun and at the end of the part.
+    /// Largest number of files and folders in the map's folder, counted at the beginning of each flush and at the end
+    /// of the part.
     pub files: u64,
-    /// Most bytes of all of them.
+    /// Largest number of bytes of all files.
     pub map_bytes: u64,
-    /// Most bytes of the log of commits.
+    /// Largest number of bytes of the log of commits.
     pub log_bytes: u64,
     pub tiles: u64,
 }
 
-/// What came of the day.
+/// Result of the day.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct DayFound {
     pub parts: Vec<Part>,
     /// Largest resident memory of the process, in bytes.
     pub peak_resident_bytes: u64,
-    /// Number of the last scan in the map that was left on disk.
+    /// Number of the last scan in the map on disk.
     pub scan_number: u64,
 }
 
-/// A part under way.
+/// A part that is being measured.
 #[derive(Default)]
-struct Under {
+struct OpenPart {
     part: Part,
     wall_ms: Samples,
     cpu_s: f64,
 }
 
 impl Day {
-    /// Lives it in this process.
+    /// Runs the day in this process.
     ///
     /// # Errors
     ///
-    /// A map that cannot be made.
+    /// Fails if the map cannot be created.
     pub fn run(self) -> Result<DayFound> {
         let config = self.case.config(Limit::Bytes(self.memory_bytes))?.with_storage(self.storage);
         let mut mapper = OutOfCoreTileMapper::create(&self.folder, config)?;
         let mut parts = Vec::new();
-        let mut under = Under::default();
+        let mut open_part = OpenPart::default();
         let mut unflushed = 0;
         let mut since_last = Stopwatch::start()?;
         for scan in self.case.scans()? {
             let scan = scan?;
-            // Making the scan is no part of it; what other threads did meanwhile is.
-            under.cpu_s += since_last.stop()?.others_s;
+            // Excludes the generation of the scan, but not what other threads did meanwhile.
+            open_part.cpu_s += since_last.stop()?.others_s;
             let stopwatch = Stopwatch::start()?;
             mapper.insert_scan(&scan)?;
             let took = stopwatch.stop()?;
-            under.wall_ms.push(1e3 * took.wall_s);
-            under.cpu_s += took.cpu_s();
+            open_part.wall_ms.push(1e3 * took.wall_s);
+            open_part.cpu_s += took.cpu_s();
             unflushed += 1;
             if unflushed >= self.flush_every_scans && !mapper.is_flushing() {
                 let stopwatch = Stopwatch::start()?;
                 mapper.begin_flush()?;
                 let took = stopwatch.stop()?;
-                under.cpu_s += took.cpu_s();
-                under.part.begin_flush_ms = under.part.begin_flush_ms.max(1e3 * took.wall_s);
-                under.part.flushes += 1;
+                open_part.cpu_s += took.cpu_s();
+                open_part.part.begin_flush_ms = open_part.part.begin_flush_ms.max(1e3 * took.wall_s);
+                open_part.part.flushes += 1;
                 unflushed = 0;
-                under.look_at(&self.folder)?;
+                open_part.look_at(&self.folder)?;
             }
-            under.part.resident_bytes = under.part.resident_bytes.max(process_memory::resident_bytes()?);
-            under.part.scans += 1;
-            if under.part.scans as usize == self.scans_per_part {
-                under.look_at(&self.folder)?;
-                let part = std::mem::take(&mut under).end(&mapper);
+            open_part.part.resident_bytes =
+                open_part.part.resident_bytes.max(process_memory::resident_bytes()?);
+            open_part.part.scans += 1;
+            if open_part.part.scans as usize == self.scans_per_part {
+                open_part.look_at(&self.folder)?;
+                let part = std::mem::take(&mut open_part).end(&mapper);
                 eprintln!("  {} scans: {:.2} ms CPU a scan, {} files", part.scans, part.cpu_ms, part.files);
                 parts.push(part);
             }
@@ -118,7 +120,7 @@ impl Day {
     }
 }
 
-impl Under {
+impl OpenPart {
     fn look_at(&mut self, folder: &Path) -> Result<()> {
         let (files, bytes) = count(folder)?;
         self.part.files = self.part.files.max(files);
@@ -143,8 +145,8 @@ impl Under {
     }
 }
 
-/// Files and folders in a folder, at any depth, and bytes of all of them. A flush goes on meanwhile: what it has not
-/// committed, and what is gone again, does not count.
+/// Counts files and folders in a folder, recursively, and their bytes. A flush may run meanwhile: uncommitted and
+/// removed files are not counted.
 fn count(folder: &Path) -> Result<(u64, u64)> {
     let (mut files, mut bytes) = (0, 0);
     let mut folders = vec![folder.to_owned()];
@@ -176,7 +178,7 @@ mod tests {
     use workload::SurveyName;
 
     #[test]
-    fn a_day_is_cut_into_parts_that_have_all_scans() {
+    fn a_day_is_split_into_parts_with_all_scans() {
         let folder = tempfile::tempdir().unwrap();
         let input = Input::EveryNth { survey: SurveyName::Warehouse, rays: 300, scans: 12, every: 20 };
         let case =
@@ -192,7 +194,7 @@ mod tests {
         let found = day.run().unwrap();
         assert_eq!((found.parts.len(), found.scan_number), (2, 12));
         assert!(found.parts.iter().all(|part| part.scans == 6 && part.files > 0 && part.log_bytes > 0));
-        // A flush that is under way when the next is due delays it.
+        // A flush that is still running when the next is due delays it.
         assert!(found.parts.iter().map(|part| part.flushes).sum::<u64>() > 0);
         let [first, second] = found.parts[..] else { panic!("two parts") };
         assert!(second.tiles > first.tiles && second.worst_ms >= second.median_ms, "{found:?}");

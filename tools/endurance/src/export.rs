@@ -11,20 +11,20 @@ use voxtile::query::OctreeExport;
 use voxtile::{MapQueries, MapReader, MapView};
 use voxtile_formats::write::{OutputFormats, VoxelRow, VoxelsHead, WriteOptions};
 
-/// A map to export in little memory.
+/// An export of a map in little memory.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Export {
     /// Folder of the map.
     pub map: PathBuf,
-    /// To what kind of file.
+    /// Format of the file.
     pub format: ExportFormat,
-    /// Bytes of memory for the part of an octree that is put together at a time.
+    /// Memory for the part of an octree that is assembled at a time, in bytes.
     pub memory_bytes: usize,
-    /// Folder for the files, which is made and removed again.
+    /// Folder for the files, created and removed again.
     pub folder: PathBuf,
 }
 
-/// What a map is exported to.
+/// Format of an export.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum ExportFormat {
     /// The centers of the occupied voxels.
@@ -35,7 +35,7 @@ pub enum ExportFormat {
     Ot,
 }
 
-/// A map that was exported.
+/// Result of an export.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Exported {
     /// Voxels in the file.
@@ -51,10 +51,10 @@ pub struct Exported {
 }
 
 impl ExportFormat {
-    /// All of them.
+    /// All formats.
     pub const ALL: [Self; 3] = [Self::Ply, Self::Bt, Self::Ot];
 
-    /// The extension of its files.
+    /// Extension of the files.
     pub fn name(self) -> &'static str {
         match self {
             Self::Ply => "ply",
@@ -65,11 +65,11 @@ impl ExportFormat {
 }
 
 impl Export {
-    /// Exports it in this process.
+    /// Exports the map in this process.
     ///
     /// # Errors
     ///
-    /// A map that cannot be read, a file that cannot be written.
+    /// Fails if the map cannot be read or the file cannot be written.
     pub fn run(self) -> Result<Exported> {
         let start_resident_bytes = process_memory::resident_bytes()?;
         fs::create_dir_all(&self.folder)
@@ -106,7 +106,7 @@ impl Export {
 
 fn write_occupied(map: &MapReader, path: &Path) -> Result<u64> {
     let grid = map.config().grid;
-    let (_, count) = map.voxel_counts().context("the map does not know how many voxels it has")?;
+    let (_, count) = map.voxel_counts().context("the map has no voxel counts")?;
     let formats = OutputFormats::default();
     let format = formats.of_name("ply").context("without PLY")?;
     let head = VoxelsHead::of_stream(count, grid.resolution_m());

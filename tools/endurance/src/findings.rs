@@ -6,29 +6,29 @@ use report::Answer;
 use serde::Serialize;
 use serde_json::{Value, json};
 
-/// What a question yields.
+/// Result of a question.
 #[derive(Default)]
 pub struct Findings {
-    /// For the page.
+    /// Tables and plots for the page.
     pub answer: Answer,
-    /// What voxtile is held to.
+    /// Promises of voxtile with measured values.
     pub promises: Vec<Promise>,
-    /// Everything that was measured, run by run.
+    /// All measurements, one per run.
     pub runs: Vec<Value>,
 }
 
 impl Findings {
-    /// Keeps a run and what it was.
+    /// Records a run and its settings.
     ///
     /// # Errors
     ///
-    /// What cannot be written as JSON.
+    /// Fails if they cannot be written as JSON.
     pub fn keep(&mut self, what: &impl Serialize, found: &impl Serialize) -> Result<()> {
         self.runs.push(json!({ "what": serde_json::to_value(what)?, "found": serde_json::to_value(found)? }));
         Ok(())
     }
 
-    /// Keeps a build, and says that it is done: a question has many, and each takes its time.
+    /// Records a build and prints a line about it.
     ///
     /// # Errors
     ///
@@ -40,13 +40,13 @@ impl Findings {
         self.keep(build, built)
     }
 
-    /// The promises that do not depend on time and were not kept, in words.
+    /// Describes the broken promises that do not depend on time.
     pub fn complaints(&self) -> Vec<String> {
         let broken = self.promises.iter().filter(|promise| !promise.is_about_time && !promise.is_kept());
         broken.map(Promise::complaint).collect()
     }
 
-    /// What goes into the page: the promises first. A short run says nothing about time.
+    /// Content of the page, promises first. A short run omits promises about time.
     pub fn into_answer(mut self, file: &'static str, is_short: bool) -> (Answer, Vec<Promise>) {
         self.promises.retain(|promise| !(is_short && promise.is_about_time));
         if !self.promises.is_empty() {
@@ -62,7 +62,7 @@ mod tests {
     use crate::promise::Wanted;
 
     #[test]
-    fn only_what_does_not_depend_on_time_is_complained_about() {
+    fn only_broken_promises_that_do_not_depend_on_time_are_reported() {
         let broken = [1.0, 3.0].map(|found| Promise::new("bytes", found, Wanted::AtMost(2.0), ""));
         let slow = Promise::about_time("time", 3.0, Wanted::AtMost(2.0), "s");
         let findings = Findings { promises: [&broken[..], &[slow]].concat(), ..Findings::default() };

@@ -8,60 +8,60 @@ use voxtile::Scan;
 use voxtile_formats::ScanStreamWriter;
 use workload::SurveyName;
 
-/// An input that is hard on memory, and the map that the command makes of it.
+/// An input that needs much memory, and the settings of its map.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct HardScan {
-    /// What it is called.
+    /// Name in tables.
     pub name: String,
-    /// What is mapped.
+    /// The input.
     pub points: Points,
     /// Edge of a voxel, in metres.
     pub resolution_m: f64,
     /// Edge of a tile, in metres.
     pub tile_size_m: f64,
-    /// In how much memory.
+    /// Memory limit, in MiB.
     pub limit_mib: usize,
-    /// Whether every ray counts.
+    /// Whether each ray is inserted on its own (`--insert per-ray`).
     pub per_ray: bool,
-    /// Whether a flush beside the mapper begins after each scan, in place of every minute.
+    /// Whether a background flush begins after each scan instead of every minute.
     pub is_flushed: bool,
-    /// Whether the map has two files a tile, in place of one compact file.
+    /// Whether the map has two files a tile instead of one compact file.
     pub is_octomap: bool,
     /// Other options of `voxtile build`.
     pub options: Vec<String>,
 }
 
-/// What is mapped.
+/// Points of an input.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub enum Points {
-    /// Scans of rays all around a sensor.
+    /// Scans with rays all around a sensor.
     Fan {
-        /// How many scans. The sensor moves on by a fifth of their reach.
+        /// Number of scans. The sensor advances by a fifth of `reach_m` between scans.
         scans: u32,
-        /// How many.
+        /// Number of rays.
         rays: u32,
-        /// How far they reach, in metres.
+        /// Length of the rays, in metres.
         reach_m: f64,
-        /// How far up and down they go: 0 is level, 1 all of the sphere.
+        /// Vertical opening: 0 is level, 1 the whole sphere.
         opening: f64,
-        /// Whether they end beyond the range, so that nothing is hit.
+        /// Whether the rays end beyond the range, so that nothing is hit.
         is_sky: bool,
     },
-    /// A PCD file of points that are all alike, packed to next to nothing.
+    /// A PCD file of equal points, compressed to almost nothing.
     Packed {
-        /// How many.
+        /// Number of points.
         points: u32,
     },
-    /// A made-up survey.
+    /// A synthetic survey.
     Survey {
-        /// Which one.
+        /// The survey.
         survey: SurveyName,
-        /// How many scans.
+        /// Number of scans.
         scans: usize,
     },
 }
 
-/// What the command took.
+/// Cost of the command.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Taken {
     /// Peak of its resident memory, in bytes.
@@ -76,11 +76,11 @@ pub struct Taken {
 
 /// Rays of a scan of a survey.
 const SURVEY_RAYS: u32 = 4_000;
-/// More than any map here takes.
+/// Larger than any map here.
 const UNLIMITED_MIB: usize = 1 << 24;
 
 impl HardScan {
-    /// What is mapped, in words.
+    /// Description of the input and the map.
     pub fn description(&self) -> String {
         let points = match &self.points {
             Points::Fan { scans, rays, reach_m, is_sky, .. } => {
@@ -101,11 +101,11 @@ impl HardScan {
         )
     }
 
-    /// Writes the input; returns its file.
+    /// Writes the input and returns its path.
     ///
     /// # Errors
     ///
-    /// A disk that refuses.
+    /// Fails if a file cannot be written.
     pub fn write(&self, folder: &Path) -> Result<PathBuf> {
         let (file, packed) = match &self.points {
             Points::Packed { points } => ("hard.pcd", Some(*points)),
@@ -137,11 +137,11 @@ impl HardScan {
         }
     }
 
-    /// Has the command beside this program map it, within the limit or without one.
+    /// Runs the command next to this program on the input, with the limit or without one.
     ///
     /// # Errors
     ///
-    /// A command that is not there or fails.
+    /// Fails if the command is missing or fails.
     pub fn build(&self, input: &Path, map: &Path, is_limited: bool) -> Result<Taken> {
         let reach_m = match self.points {
             Points::Fan { reach_m, .. } => reach_m,
@@ -162,14 +162,14 @@ impl HardScan {
         let before = children_cpu_s()?;
         let output = command()?.args(arguments).arg(input).arg("-o").arg(map).output()?;
         let cpu_s = children_cpu_s()? - before;
-        let said = String::from_utf8_lossy(&output.stderr);
-        ensure!(output.status.success(), "{}: {}: {said}", self.name, output.status);
+        let errors = String::from_utf8_lossy(&output.stderr);
+        ensure!(output.status.success(), "{}: {}: {errors}", self.name, output.status);
         let built: serde_json::Value = serde_json::from_slice(&output.stdout)?;
         let number = |key: &str| built[key].as_u64().with_context(|| format!("the summary has no {key}"));
         let digest = command()?.arg("digest").arg(map).stderr(Stdio::inherit()).output()?;
         ensure!(digest.status.success(), "{}: no digest: {}", self.name, digest.status);
         let digest = String::from_utf8(digest.stdout)?;
-        fs::remove_dir_all(map).with_context(|| format!("{}: cannot be removed", map.display()))?;
+        fs::remove_dir_all(map).with_context(|| format!("{}: cannot remove", map.display()))?;
         Ok(Taken {
             peak_bytes: number("peak_rss_bytes")?,
             cpu_s,
@@ -187,17 +187,17 @@ fn command() -> Result<Command> {
 
 /// CPU time of the processes that this one has waited for, in seconds.
 fn children_cpu_s() -> Result<f64> {
-    /// What the kernel counts in, on every Linux that there is.
+    /// USER_HZ, which is 100 on all Linux platforms.
     const TICKS_PER_SECOND: f64 = 100.0;
     let stat = fs::read_to_string("/proc/self/stat")?;
-    // Behind the name, which may hold anything, the 16th and 17th of all.
+    // The 16th and 17th fields; the name before `)` may contain anything.
     let fields: Vec<&str> = stat.rsplit(')').next().unwrap_or_default().split_whitespace().collect();
     let ticks = |at: usize| fields.get(at).and_then(|ticks| ticks.parse::<f64>().ok());
     let ticks = ticks(13).zip(ticks(14)).context("/proc/self/stat: no CPU time of children")?;
     Ok((ticks.0 + ticks.1) / TICKS_PER_SECOND)
 }
 
-/// Rays in all directions of a band around a sensor, near and far as over a rough surface.
+/// Rays in all directions of a band around a sensor, with lengths varied as over a rough surface.
 fn fan(rays: u32, reach_m: f64, opening: f64, ahead_m: f64) -> Scan {
     let origin = [0.03 + ahead_m, 0.04, 1.8];
     let point = |k: u32| {
@@ -210,7 +210,7 @@ fn fan(rays: u32, reach_m: f64, opening: f64, ahead_m: f64) -> Scan {
     Scan { origin, points: (0..rays).map(point).collect(), intensities: None }
 }
 
-/// Points at (3, 4, 5) m: each field is one value and copies of it from four bytes back.
+/// Writes points at (3, 4, 5) m: each field is one value and LZF copies of it from four bytes back.
 fn write_packed(points: u32, out: &mut impl Write) -> Result<()> {
     let mut packed: Vec<u8> = Vec::new();
     for value in [3.0_f32, 4.0, 5.0] {
@@ -218,7 +218,7 @@ fn write_packed(points: u32, out: &mut impl Write) -> Result<()> {
         packed.extend(value.to_le_bytes());
         let mut left = 4 * (points as usize - 1);
         while left > 0 {
-            // At least three bytes, and none left over that would be fewer.
+            // A copy has at least three bytes, so no remainder may be shorter.
             let length = if left > 264 + 2 { 264 } else { left.min(264) };
             let length = if left > length && left - length < 3 { length - 3 } else { length };
             let code = length - 2;
@@ -246,7 +246,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_packed_file_holds_as_many_points_as_it_says() {
+    fn a_packed_file_has_the_requested_number_of_points() {
         for points in [1, 2, 67, 68, 1000, 70_001] {
             let mut file = Vec::new();
             write_packed(points, &mut file).unwrap();

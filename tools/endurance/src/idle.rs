@@ -8,39 +8,39 @@ use std::thread;
 use std::time::Duration;
 use voxtile::{MapView, Mapper, OutOfCoreTileMapper};
 
-/// A mapper that has taken scans, is not flushed, and has nothing to do.
+/// A mapper that is idle after some scans, without a flush.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Idle {
     /// The scans.
     pub case: Case,
-    /// Bytes for all that grows.
+    /// Memory limit in bytes, for all that grows.
     pub memory_bytes: usize,
-    /// How long it has nothing to do, in seconds.
+    /// Idle time, in seconds.
     pub idle_s: f64,
-    /// Folder of the map, which must not exist and is removed again.
+    /// Folder of the map. It must not exist, and is removed at the end.
     pub folder: PathBuf,
 }
 
-/// What doing nothing took.
+/// Cost of the idle time.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Idled {
-    /// Time on the wall, in seconds.
+    /// Wall time, in seconds.
     pub wall_s: f64,
-    /// CPU time of all threads meanwhile, in seconds.
+    /// CPU time of all threads, in seconds.
     pub cpu_s: f64,
-    /// Tiles that were written before.
+    /// Tiles written before.
     pub saves: u64,
 }
 
-/// How long threads may go on with what the last scan left them to do.
-const AFTERWARDS: Duration = Duration::from_secs(2);
+/// Time for threads to finish the work of the last scan.
+const SETTLING_TIME: Duration = Duration::from_secs(2);
 
 impl Idle {
-    /// Does nothing in this process.
+    /// Runs it in this process.
     ///
     /// # Errors
     ///
-    /// A map that cannot be made.
+    /// Fails if the map cannot be created.
     pub fn run(self) -> Result<Idled> {
         let config = self.case.config(Limit::Bytes(self.memory_bytes))?;
         let mut mapper = OutOfCoreTileMapper::create(&self.folder, config)?;
@@ -48,7 +48,7 @@ impl Idle {
             mapper.insert_scan(&scan?)?;
         }
         let saves = mapper.statistics().io.saves;
-        thread::sleep(AFTERWARDS);
+        thread::sleep(SETTLING_TIME);
         let stopwatch = Stopwatch::start()?;
         thread::sleep(Duration::from_secs_f64(self.idle_s));
         let took = stopwatch.stop()?;

@@ -1,4 +1,4 @@
-//! The benchmark `endurance`: how the out-of-core mapper behaves over distance, as tables and plots.
+//! The benchmark `endurance`: memory, speed and files of the out-of-core mapper over distance, as tables and plots.
 
 mod bucket;
 mod build;
@@ -26,15 +26,15 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-/// Measures how the out-of-core mapper behaves over distance and writes tables and plots.
+/// Measures memory, speed and files of the out-of-core mapper over distance, and writes tables and plots.
 ///
-/// Exits with 1 if a promise is broken that does not depend on time.
+/// Exits with 1 if a promise that does not depend on time is broken.
 #[derive(Debug, Parser)]
 #[command(name = "endurance", version)]
 struct Arguments {
     #[command(flatten)]
     options: Options,
-    /// File for all that was measured, scan by scan, as JSON
+    /// File for all measurements, scan by scan, as JSON
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
 }
@@ -45,7 +45,7 @@ fn main() -> ExitCode {
     report::exit_code("endurance", outcome)
 }
 
-/// Answers whether all was kept that does not depend on time.
+/// Returns whether all promises hold that do not depend on time.
 fn run(Arguments { options, json }: &Arguments) -> Result<bool> {
     let wanted = options.wanted(&QUESTIONS, |question| question.name.to_owned())?;
     let bench = Bench::open("endurance", options)?;
@@ -70,7 +70,7 @@ fn run(Arguments { options, json }: &Arguments) -> Result<bool> {
         }
     }
     for complaint in &complaints {
-        eprintln!("endurance: not kept: {complaint}");
+        eprintln!("endurance: broken promise: {complaint}");
     }
     Ok(complaints.is_empty())
 }

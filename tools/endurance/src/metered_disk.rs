@@ -6,26 +6,26 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use voxtile::store::{Disk, DiskLock, DiskRead, DiskWrite, EntryKind, FsDisk, ReaderWatch, Scratch};
 
-/// How fast a disk is.
+/// Speed of a disk.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub enum DiskSpeed {
-    /// As fast as it is.
+    /// The real speed.
     Own,
-    /// It moves at most so many bytes a second, reads and writes together. A write waits for its bytes and a sync for
-    /// all that was written, whoever wrote it: there is no cache behind which bytes could wait for free.
+    /// At most this many bytes a second, reads and writes together. A write waits for its bytes and a sync for all
+    /// earlier writes: there is no cache that hides them.
     BytesPerSecond(f64),
-    /// The medium is not waited for: for what does not depend on time.
+    /// No syncs, for measurements that do not depend on time.
     Unsynced,
 }
 
-/// The file system at some speed, counting the bytes that go either way.
+/// The file system at some speed, with counters of the bytes read and written.
 #[derive(Debug)]
 pub struct MeteredDisk {
     meter: Arc<Meter>,
     is_synced: bool,
 }
 
-/// What went either way.
+/// Counters of bytes.
 #[derive(Debug, Default)]
 pub struct Meter {
     bytes_read: AtomicU64,
@@ -40,7 +40,7 @@ struct Metered<T> {
 }
 
 impl MeteredDisk {
-    /// The file system at a speed.
+    /// Creates the file system with a speed.
     pub fn new(speed: DiskSpeed) -> Self {
         let bucket = match speed {
             DiskSpeed::BytesPerSecond(bytes_per_s) => Some(Bucket::new(bytes_per_s)),
@@ -50,7 +50,7 @@ impl MeteredDisk {
         Self { meter, is_synced: speed != DiskSpeed::Unsynced }
     }
 
-    /// What counts.
+    /// The counters.
     pub fn meter(&self) -> Arc<Meter> {
         self.meter.clone()
     }
@@ -199,7 +199,7 @@ mod tests {
     use std::time::{Duration, Instant};
 
     #[test]
-    fn bytes_are_counted_and_a_slow_disk_takes_its_time_for_both_ways() {
+    fn bytes_are_counted_and_reads_and_writes_take_time_on_a_slow_disk() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("file");
         let disk = MeteredDisk::new(DiskSpeed::BytesPerSecond(1e6));
@@ -216,11 +216,11 @@ mod tests {
     }
 
     #[test]
-    fn a_sync_waits_for_what_was_written_last() {
+    fn a_sync_waits_for_the_last_write() {
         let folder = tempfile::tempdir().unwrap();
         let disk = MeteredDisk::new(DiskSpeed::BytesPerSecond(1e5));
         let begin = Instant::now();
-        // Too little for a write to wait for.
+        // Too few bytes for the write to wait.
         disk.create(&folder.path().join("file")).unwrap().write_all(&[7; 150]).unwrap();
         disk.sync_folder(folder.path()).unwrap();
         assert!(begin.elapsed() >= Duration::from_micros(1_400), "{:?}", begin.elapsed());

@@ -1,42 +1,42 @@
 use report::{Cell, Table};
 use serde::Serialize;
 
-/// Something that voxtile is held to, and what was found.
+/// A required bound on a measured value, and the value.
 #[derive(Clone, Debug, Serialize)]
 pub struct Promise {
-    /// What it is about.
+    /// Name of the measured value.
     pub what: String,
-    /// What was measured.
+    /// Measured value.
     pub found: f64,
-    /// What is wanted.
+    /// Required bound.
     pub wanted: Wanted,
-    /// What it is measured in; empty for what has no unit.
+    /// Unit; empty for ratios and counts.
     pub unit: &'static str,
-    /// Whether it depends on how fast the machine is and what else it does.
+    /// Whether it depends on the speed and load of the machine.
     pub is_about_time: bool,
 }
 
-/// Where a number is wanted to be.
+/// Bound on a value.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub enum Wanted {
-    /// Not above this.
+    /// Upper bound, inclusive.
     AtMost(f64),
-    /// Not below this.
+    /// Lower bound, inclusive.
     AtLeast(f64),
 }
 
 impl Promise {
-    /// One that holds on any machine, or not.
+    /// Creates a promise that does not depend on time.
     pub fn new(what: impl Into<String>, found: f64, wanted: Wanted, unit: &'static str) -> Self {
         Self { what: what.into(), found, wanted, unit, is_about_time: false }
     }
 
-    /// One about time.
+    /// Creates a promise about time.
     pub fn about_time(what: impl Into<String>, found: f64, wanted: Wanted, unit: &'static str) -> Self {
         Self { is_about_time: true, ..Self::new(what, found, wanted, unit) }
     }
 
-    /// Whether what was found is as wanted; what is no number is not.
+    /// Returns whether the value is within its bound; NaN never is.
     pub fn is_kept(&self) -> bool {
         match self.wanted {
             Wanted::AtMost(most) => self.found <= most,
@@ -44,7 +44,7 @@ impl Promise {
         }
     }
 
-    /// What is to be said of a promise that was not kept.
+    /// Describes a broken promise.
     pub fn complaint(&self) -> String {
         format!("{}: {}, wanted {}", self.what, self.found_text(), self.wanted.text(self.unit))
     }
@@ -66,7 +66,7 @@ impl Wanted {
     }
 }
 
-/// Promises as a table.
+/// Table of promises.
 pub fn table(file: &'static str, caption: &str, promises: &[Promise]) -> Table {
     let mut table = Table::new(file, caption, ["promise", "found", "wanted", "kept"]);
     for promise in promises {
@@ -86,7 +86,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_promise_is_kept_up_to_its_limit_and_never_by_what_is_no_number() {
+    fn a_bound_is_inclusive_and_nan_breaks_it() {
         let kept = |found, wanted| Promise::new("it", found, wanted, "").is_kept();
         assert!(kept(4.0, Wanted::AtMost(4.0)) && !kept(4.1, Wanted::AtMost(4.0)));
         assert!(kept(0.6, Wanted::AtLeast(0.6)) && !kept(0.5, Wanted::AtLeast(0.6)));
@@ -94,7 +94,7 @@ mod tests {
     }
 
     #[test]
-    fn tables_and_complaints_say_what_was_wanted() {
+    fn tables_and_complaints_show_the_bound() {
         let promise = Promise::new("bytes written by bytes of the map", 4.126, Wanted::AtMost(4.0), "x");
         assert_eq!(promise.complaint(), "bytes written by bytes of the map: 4.13 x, wanted <= 4 x");
         let table = table("promises", "All.", &[promise]).markdown();

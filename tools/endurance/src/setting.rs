@@ -5,15 +5,15 @@ use std::path::PathBuf;
 use voxtile::Storage;
 use workload::SurveyName;
 
-/// What questions are put to, and how long they may take.
+/// Inputs of the questions, and how much to measure.
 pub struct Setting {
     /// Folder of the recorded data sets.
     pub data: PathBuf,
-    /// Folder for maps, which come and go.
+    /// Folder for temporary maps.
     pub work: PathBuf,
-    /// Whether to look only at what does not depend on time.
+    /// Whether to check only results that do not depend on time.
     pub is_short: bool,
-    /// Runs of which medians are taken.
+    /// Number of runs for a median.
     pub runs: usize,
 }
 
@@ -21,19 +21,18 @@ pub struct Setting {
 pub const RAYS: u32 = 8_000;
 
 impl Setting {
-    /// One of two, the second where the run is to be short.
+    /// Returns `short` in a short run, else `full`.
     pub fn size<T>(&self, full: T, short: T) -> T {
         if self.is_short { short } else { full }
     }
 
-    /// The recorded drive along a river, where it is there; where not, a line says so.
+    /// The recorded drive along a river; prints a line if it is missing.
     pub fn riverside(&self, tile_size_m: f64) -> Option<Case> {
         let input = Input::Recorded { folder: report::recorded_set(&self.data, "mulran_riverside02_a")? };
         Some(Case { name: "riverside".into(), input, resolution_m: 0.1, tile_size_m, max_range_m: 100.0 })
     }
 
-    /// A map to build on the disk as it is, whose digest is wanted. Where time is not looked at, the disk is not waited
-    /// for.
+    /// A build on the disk at its own speed, with a digest. Short runs do not sync the disk.
     pub fn build(&self, case: &Case, limit: Limit) -> Build {
         Build {
             case: case.clone(),
@@ -49,17 +48,17 @@ impl Setting {
     }
 }
 
-/// A map of a made-up survey: so many scans, with voxels and tiles and as far as given in metres.
-pub fn made_up(
+/// A map of a synthetic survey: number of rays and scans; voxel size, tile size and maximum range in metres.
+pub fn synthetic(
     name: &str,
     (survey, rays, scans): (SurveyName, u32, usize),
     [resolution_m, tile_size_m, max_range_m]: [f64; 3],
 ) -> Case {
-    let input = Input::MadeUp { survey, rays, scans };
+    let input = Input::Synthetic { survey, rays, scans };
     Case { name: name.into(), input, resolution_m, tile_size_m, max_range_m }
 }
 
-/// MiB, as tables and plots show bytes of memory.
+/// Converts bytes to MiB.
 pub fn mib(bytes: f64) -> f64 {
     bytes / f64::from(1 << 20)
 }

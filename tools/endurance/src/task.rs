@@ -9,43 +9,43 @@ use serde::{Deserialize, Serialize};
 use std::io::{self, Write};
 use std::process::{Command, Stdio};
 
-/// What a process is begun for: its peak of memory is that of nothing else.
+/// A task for a process of its own, so that its peak of memory includes nothing else.
 #[derive(Debug, Serialize, Deserialize)]
 pub enum Task {
     /// Build a map.
     Build(Build),
-    /// Find out how large the working set is.
+    /// Measure the size of the working set.
     WorkingSet(WorkingSet),
     /// Export a map.
     Export(Export),
-    /// Do nothing.
+    /// Stay idle.
     Idle(Idle),
     /// Map the same place all day.
     Day(Day),
 }
 
-/// What tells the program to do a task that comes from standard input.
+/// Argument that makes the program do a task from standard input.
 pub const TASK_ARGUMENT: &str = "--task";
 
-/// What a process of its own can be begun for.
-pub trait Apart: Sized {
-    /// What comes of it.
+/// A task that can run in a child process.
+pub trait ChildTask: Sized {
+    /// Result of the task.
     type Found: DeserializeOwned;
 
-    /// The task of the process.
+    /// Converts it into the task of the process.
     fn into_task(self) -> Task;
 
-    /// Has a new process do it, and waits.
+    /// Runs the task in a new process and waits for it.
     ///
     /// # Errors
     ///
-    /// A process that cannot be begun or fails.
-    fn apart(self) -> Result<Self::Found> {
-        apart(&self.into_task())
+    /// Fails if the process cannot be started or fails.
+    fn run_in_child(self) -> Result<Self::Found> {
+        run_in_child(&self.into_task())
     }
 }
 
-impl Apart for Build {
+impl ChildTask for Build {
     type Found = Built;
 
     fn into_task(self) -> Task {
@@ -53,7 +53,7 @@ impl Apart for Build {
     }
 }
 
-impl Apart for WorkingSet {
+impl ChildTask for WorkingSet {
     type Found = WorkingSetFound;
 
     fn into_task(self) -> Task {
@@ -61,7 +61,7 @@ impl Apart for WorkingSet {
     }
 }
 
-impl Apart for Export {
+impl ChildTask for Export {
     type Found = Exported;
 
     fn into_task(self) -> Task {
@@ -69,7 +69,7 @@ impl Apart for Export {
     }
 }
 
-impl Apart for Idle {
+impl ChildTask for Idle {
     type Found = Idled;
 
     fn into_task(self) -> Task {
@@ -77,7 +77,7 @@ impl Apart for Idle {
     }
 }
 
-impl Apart for Day {
+impl ChildTask for Day {
     type Found = DayFound;
 
     fn into_task(self) -> Task {
@@ -85,13 +85,13 @@ impl Apart for Day {
     }
 }
 
-/// Does the task that comes from standard input, and says to standard output what came of it.
+/// Does the task on standard input and writes its result to standard output.
 ///
 /// # Errors
 ///
-/// A task that is none, and what the task itself meets.
+/// Fails if the input is not a task, or with the error of the task.
 pub fn do_task() -> Result<()> {
-    let task = serde_json::from_reader(io::stdin().lock()).context("standard input has no task")?;
+    let task = serde_json::from_reader(io::stdin().lock()).context("standard input has no valid task")?;
     let outcome = match task {
         Task::Build(build) => serde_json::to_value(build.run()?),
         Task::WorkingSet(working_set) => serde_json::to_value(working_set.run()?),
@@ -103,18 +103,18 @@ pub fn do_task() -> Result<()> {
     Ok(())
 }
 
-/// Has a new process do a task. It has one heap for all threads, as the command `voxtile` has.
-fn apart<T: DeserializeOwned>(task: &Task) -> Result<T> {
-    let program = std::env::current_exe().context("cannot find the own program")?;
+/// Runs a task in a new process. One malloc arena serves all threads, as in the command `voxtile`.
+fn run_in_child<T: DeserializeOwned>(task: &Task) -> Result<T> {
+    let program = std::env::current_exe().context("cannot find this program")?;
     let mut command = Command::new(program);
     command.arg(TASK_ARGUMENT).env("MALLOC_ARENA_MAX", "1");
     let mut child =
-        command.stdin(Stdio::piped()).stdout(Stdio::piped()).spawn().context("cannot begin a process")?;
+        command.stdin(Stdio::piped()).stdout(Stdio::piped()).spawn().context("cannot start a process")?;
     if let Some(mut stdin) = child.stdin.take() {
-        // A child that is gone already says why itself.
+        // A child that has already ended prints the reason itself.
         let _ = stdin.write_all(&serde_json::to_vec(task)?);
     }
     let output = child.wait_with_output().context("cannot wait for a process")?;
-    ensure!(output.status.success(), "the process failed ({}); what it said is above", output.status);
-    serde_json::from_slice(&output.stdout).context("the process gave no answer that can be read")
+    ensure!(output.status.success(), "the process failed ({}); its output is above", output.status);
+    serde_json::from_slice(&output.stdout).context("the process returned an unreadable result")
 }

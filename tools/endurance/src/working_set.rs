@@ -7,27 +7,27 @@ use voxtile::scan::ScanTracer;
 use voxtile::space::TileIndex;
 use voxtile::{InMemoryMapper, MapQueries, MapView, Mapper};
 
-/// The tiles that a mapper is at work on: those that the last [`WorkingSet::SCANS`] scans touched.
+/// The tiles that the last [`WorkingSet::SCANS`] scans touched.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct WorkingSet {
-    /// Of which scans.
+    /// The scans.
     pub case: Case,
 }
 
-/// How large the working set is.
+/// Size of the working set.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct WorkingSetFound {
-    /// Bytes of its tiles in a map that lives in memory: what is not exceeded 95 times of 100.
+    /// Bytes of its tiles in a map in memory, 95th percentile of the run.
     pub bytes: u64,
-    /// Tiles of it, likewise.
+    /// Number of its tiles, 95th percentile.
     pub tiles: u64,
-    /// Bytes of all tiles in the end.
+    /// Bytes of all tiles at the end.
     pub map_bytes: u64,
     /// The digest of the map, in hexadecimal digits.
     pub digest: String,
 }
 
-/// Tiles and by how many of the last scans they were touched.
+/// Tiles, with the number of the last scans that touched them.
 #[derive(Default)]
 struct Window {
     scans: VecDeque<Vec<TileIndex>>,
@@ -35,16 +35,16 @@ struct Window {
 }
 
 impl WorkingSet {
-    /// How many scans are the last.
+    /// Number of last scans.
     pub const SCANS: usize = 50;
-    /// The share of the run in which it is not larger.
+    /// The percentile that is reported.
     const SHARE: f64 = 0.95;
 
-    /// Finds it in this process.
+    /// Measures it in this process.
     ///
     /// # Errors
     ///
-    /// Scans that cannot be read, a map that cannot be made.
+    /// Fails if scans cannot be read or the map cannot be created.
     pub fn run(self) -> Result<WorkingSetFound> {
         let config = self.case.config(Limit::InMemory)?;
         let mut mapper = InMemoryMapper::new(config.clone())?;

@@ -1,16 +1,16 @@
-//! The threads of the mapper under a scheduler that chooses who goes on at every lock, channel and wait: the thread
-//! that writes octrees with its queue and its trees, the threads that carry tiles to disk and back, and what they are
-//! carried for: the tiles of a map in little memory, on a disk in memory.
+//! Tests of the mapper's threads under a scheduler that chooses the next thread at every lock, channel and wait. The
+//! tests cover the thread that writes octrees with its queue and its trees, the threads that save and load tiles, and
+//! the tiles of a map in little memory, on a disk in memory.
 //!
 //! ```text
-//! cargo test -p interleavings                            800 orders of each test
+//! cargo test -p interleavings                            800 schedules of each test
 //! INTERLEAVINGS=1000000 cargo test --release -p interleavings
 //! ```
 //!
-//! Without `unsafe` there are no data races to look for; what can go wrong is a deadlock, a wake-up that is lost, work
-//! that is lost or done twice, an answer that misses what was there. Half of the orders are random, half change few
-//! times at places chosen at random (PCT), which finds what needs few changes with a known probability. A failure
-//! prints its order, for `shuttle::replay`.
+//! Safe Rust has no data races. The tests look for deadlocks, lost wake-ups, work that is lost or done twice, and
+//! answers that miss an update. Half of the schedules are random, half change the thread at few random points (PCT),
+//! which finds bugs that need few changes with a known probability. A failure prints its schedule, for
+//! `shuttle::replay`.
 #![allow(dead_code, unused_imports)]
 
 macro_rules! source {
@@ -97,7 +97,7 @@ mod persistence {
     mod parameters {
         source!("parameters.rs");
     }
-    /// The scheduler has threads of its own, and no order among them is to be left out.
+    /// Priorities are left out: the scheduler has its own threads, and must try all schedules.
     mod priority {
         pub(super) fn lower_priority() {}
     }
@@ -199,15 +199,15 @@ mod mapper {
 #[cfg(test)]
 use shuttle::scheduler::{PctScheduler, RandomScheduler};
 
-/// Runs a life of threads in many orders.
+/// Runs a test in many schedules.
 #[cfg(test)]
 fn in_many_orders(life: impl Fn() + Send + Sync + Copy + 'static) {
     let orders = std::env::var("INTERLEAVINGS").ok().and_then(|text| text.parse().ok()).unwrap_or(800);
     let mut config = shuttle::Config::new();
-    // A file is written by deeper calls than a lock is taken.
+    // Writing a file needs a deeper stack than taking a lock.
     config.stack_size = 1 << 20;
     let life = move || {
-        // The scheduler refuses a first life without two threads at once, and a random life may be one.
+        // The scheduler refuses a first run without two concurrent threads, and a random run may be one.
         let other = shuttle::thread::spawn(shuttle::thread::yield_now);
         life();
         other.join().expect("it does nothing");

@@ -1,47 +1,47 @@
 use anyhow::Result;
-use report::{Stopwatch, Took};
+use report::{Elapsed, Stopwatch};
 use voxtile::mapper::MapStatistics;
 use voxtile::{
     InMemoryMapper, MapConfig, MapView, Mapper, OctreeConfig, Scan, VoxelCacheConfig, VoxelCacheMode,
 };
 
-/// A form of octree that is compared.
+/// A form of octree to compare.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Contender {
-    /// Every update goes straight into the pointer tree: OctoMap.
+    /// Every update is written directly to the pointer tree: OctoMap.
     Off,
-    /// A voxel cache in front of it: serial OctoCache.
+    /// The pointer tree with a voxel cache: serial OctoCache.
     Serial,
-    /// And a thread that writes the tree: parallel OctoCache.
+    /// The same with a thread that writes the tree: parallel OctoCache.
     Parallel,
-    /// A view of the table's bricks: what voxtile does if nothing else is said.
+    /// A view of the table's bricks: voxtile's default.
     Bricks,
 }
 
-/// A map that was built, and what that took.
+/// Result of a build.
 pub struct Build {
-    /// The clocks while the scans were inserted.
-    pub inserting: Took,
-    /// The clocks while the trees were brought up to date after the last scan.
-    pub draining: Took,
-    /// What the mapper had counted when the last scan was inserted.
+    /// Times of inserting the scans.
+    pub inserting: Elapsed,
+    /// Times of updating the trees after the last scan.
+    pub draining: Elapsed,
+    /// Statistics after the last scan was inserted.
     pub inserted: MapStatistics,
-    /// What it had counted in the end.
+    /// Statistics at the end.
     pub statistics: MapStatistics,
 }
 
 impl Build {
-    /// The clocks from the first scan until everything is in the trees.
-    pub fn took(&self) -> Took {
+    /// Times from the first scan until all updates are in the trees.
+    pub fn elapsed(&self) -> Elapsed {
         self.inserting + self.draining
     }
 }
 
 impl Contender {
-    /// All, in the order of tables.
+    /// All contenders, in the order of tables.
     pub const ALL: [Self; 4] = [Self::Off, Self::Serial, Self::Parallel, Self::Bricks];
 
-    /// What tables and plots call it.
+    /// Name in tables and plots.
     pub fn name(self) -> &'static str {
         match self {
             Self::Off => "off",
@@ -51,7 +51,7 @@ impl Contender {
         }
     }
 
-    /// The configuration with this form of octree; a voxel cache, if there is one, has the shape `cache`.
+    /// Returns the configuration with this form of octree; `cache` is the shape of its voxel cache, if it has one.
     pub fn configure(self, config: MapConfig, cache: VoxelCacheConfig) -> MapConfig {
         config.with_octree(match self {
             Self::Off => OctreeConfig::Pointers(VoxelCacheMode::Off),
@@ -63,8 +63,8 @@ impl Contender {
 
     /// Builds the map of the scans in memory.
     ///
-    /// Views of bricks are brought up to date after every scan, for OctoMap's tree is always. What the voxel caches
-    /// still hold in the end goes into the trees, too.
+    /// Views of bricks are updated after every scan, as OctoMap's tree always is. Voxel caches are written to the trees
+    /// at the end.
     pub fn build(self, config: &MapConfig, cache: VoxelCacheConfig, scans: &[Scan]) -> Result<Build> {
         let mut mapper = InMemoryMapper::new(self.configure(config.clone(), cache))?;
         let stopwatch = Stopwatch::start()?;
@@ -78,7 +78,7 @@ impl Contender {
         let inserted = mapper.statistics();
         let stopwatch = Stopwatch::start()?;
         mapper.sync_octrees();
-        // The map is dropped after the clocks were read.
+        // The map is dropped after the measurement.
         Ok(Build { inserting, draining: stopwatch.stop()?, inserted, statistics: mapper.statistics() })
     }
 }
@@ -107,7 +107,7 @@ mod tests {
     }
 
     #[test]
-    fn only_those_with_a_cache_hit_it_and_only_one_has_a_queue() {
+    fn only_contenders_with_a_cache_hit_it_and_only_parallel_has_a_queue() {
         let scans = datasets(Path::new(""))[1].scans(2).unwrap();
         for contender in Contender::ALL {
             let config = map_config(0.4).unwrap();

@@ -5,35 +5,35 @@ use voxtile::{MapConfig, Scan};
 use voxtile_formats::{ReadOptions, open_scans};
 use workload::SurveyName;
 
-/// Scans that the questions are put to.
+/// Scans of the measurements.
 #[derive(Clone, Debug)]
 pub struct Dataset {
-    /// What tables and plots call it.
+    /// Name in tables and plots.
     pub name: &'static str,
-    /// Scans that together have some 30 million updates of rays where voxels have 0.1 m.
+    /// Number of scans with about 30 million updates of rays together, at a resolution of 0.1 m.
     pub some_scans: usize,
     source: Source,
 }
 
 #[derive(Clone, Debug)]
 enum Source {
-    MadeUp(SurveyName),
+    Synthetic(SurveyName),
     /// A folder of scans and poses.
     Recorded(PathBuf),
 }
 
-/// Cuts rays, in metres.
+/// Maximum range, in metres.
 pub const MAX_RANGE_M: f64 = 60.0;
-/// Seed of the made-up surveys.
+/// Seed of the synthetic surveys.
 const SEED: u64 = 1;
-/// Edge of a tile that is wanted, in metres.
+/// Approximate edge of a tile, in metres.
 const TILE_SIZE_M: f64 = 10.0;
 
-/// The made-up surveys, and the recorded sets that are in the folder `data`.
+/// The synthetic surveys, and the recorded sets in the folder `data`.
 pub fn datasets(data: &Path) -> Vec<Dataset> {
-    let made_up = [("street", 3, SurveyName::Street), ("indoor", 8, SurveyName::Indoor)];
-    let mut datasets: Vec<Dataset> = made_up
-        .map(|(name, some_scans, survey)| Dataset { name, some_scans, source: Source::MadeUp(survey) })
+    let synthetic = [("street", 3, SurveyName::Street), ("indoor", 8, SurveyName::Indoor)];
+    let mut datasets: Vec<Dataset> = synthetic
+        .map(|(name, some_scans, survey)| Dataset { name, some_scans, source: Source::Synthetic(survey) })
         .into();
     let recorded = [
         ("riverside", 8, "mulran_riverside02_a"),
@@ -48,10 +48,10 @@ pub fn datasets(data: &Path) -> Vec<Dataset> {
 }
 
 impl Dataset {
-    /// Reads or makes the first scans, no more than so many, without intensities.
+    /// Reads or generates at most `count` scans from the beginning, without intensities.
     pub fn scans(&self, count: usize) -> Result<Vec<Scan>> {
         let mut scans = match &self.source {
-            Source::MadeUp(survey) => survey.scans(SEED, 0, SurveyName::RAYS).take(count).collect(),
+            Source::Synthetic(survey) => survey.scans(SEED, 0, SurveyName::RAYS).take(count).collect(),
             Source::Recorded(folder) => {
                 recorded(folder, count).with_context(|| format!("the set {}", self.name))?
             }
@@ -71,15 +71,15 @@ fn recorded(folder: &Path, count: usize) -> Result<Vec<Scan>> {
     Ok(scans)
 }
 
-/// A map with voxels of this edge in metres, tiles of about 10 m, OctoMap's log-odds and the max range of all
-/// questions.
+/// Settings of a map with this edge of a voxel in metres, tiles of about 10 m, OctoMap's log-odds and the common
+/// maximum range.
 pub fn map_config(resolution_m: f64) -> Result<MapConfig> {
     let voxels_per_tile_edge = (TILE_SIZE_M / resolution_m).round();
     Ok(MapConfig::new(resolution_m, voxels_per_tile_edge * resolution_m)?.with_range(0.0, MAX_RANGE_M))
 }
 
-/// The same with one large tile, and the scans moved so that they begin in the middle of one: as in the paper, there is
-/// one voxel cache and one octree, unless the scans go far.
+/// The same with one large tile, and the scans moved so that they begin in its middle: as in the paper, there is one
+/// voxel cache and one octree, unless the scans leave the tile.
 pub fn in_one_tile(resolution_m: f64, scans: Vec<Scan>) -> Result<(MapConfig, Vec<Scan>)> {
     let tile_size_m = f64::from(MAX_VOXELS_PER_TILE_EDGE) * resolution_m;
     let config = MapConfig::new(resolution_m, tile_size_m)?.with_range(0.0, MAX_RANGE_M);
@@ -101,7 +101,7 @@ mod tests {
     }
 
     #[test]
-    fn scans_that_stay_near_are_in_one_tile() {
+    fn scans_within_half_a_tile_are_in_one_tile() {
         use voxtile::{InMemoryMapper, MapView, Mapper};
         let (config, scans) = in_one_tile(0.2, datasets(Path::new(""))[0].scans(2).unwrap()).unwrap();
         let mut mapper = InMemoryMapper::new(config).unwrap();
@@ -112,7 +112,7 @@ mod tests {
     }
 
     #[test]
-    fn recorded_sets_that_are_not_there_are_left_out() {
+    fn missing_recorded_sets_are_left_out() {
         let empty = tempfile::tempdir().unwrap();
         let names: Vec<_> = datasets(empty.path()).iter().map(|dataset| dataset.name).collect();
         assert_eq!(names, ["street", "indoor"]);

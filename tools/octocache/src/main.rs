@@ -1,4 +1,4 @@
-//! The benchmark `octocache`: puts the questions of the OctoCache paper to voxtile and writes tables and plots.
+//! The benchmark `octocache`: repeats the measurements of the OctoCache paper with voxtile, as tables and plots.
 
 mod contender;
 mod dataset;
@@ -13,7 +13,7 @@ use report::{Bench, Options};
 use setting::Setting;
 use std::process::ExitCode;
 
-/// Puts the questions of the OctoCache paper to voxtile and writes tables and plots.
+/// Repeats the measurements of the OctoCache paper with voxtile, and writes tables and plots.
 #[derive(Debug, Parser)]
 #[command(name = "octocache", version)]
 struct Arguments {
@@ -33,7 +33,7 @@ fn run(options: &Options) -> Result<()> {
         is_short: options.short,
         runs: options.runs_or(3) as usize,
     };
-    // What other threads there are belongs to the engine: rays and tiles are worked on by this one.
+    // Rays and tiles are processed by this thread; other threads belong to the octree engine.
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1).use_current_thread().build()?;
     for question in wanted {
         let answer = bench.ask(question.name, || pool.install(|| (question.answer)(&setting)))?;

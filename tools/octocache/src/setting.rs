@@ -1,17 +1,17 @@
 use crate::dataset::Dataset;
 
-/// What a question is put to, and how long it may take.
+/// Inputs of the questions, and how much to measure.
 pub struct Setting {
     /// The scans.
     pub datasets: Vec<Dataset>,
-    /// Whether to look only whether everything works.
+    /// Whether to check only that everything works.
     pub is_short: bool,
-    /// Runs of which the median is taken.
+    /// Number of runs for a median.
     pub runs: usize,
 }
 
 impl Setting {
-    /// One of two, the second where the run is to be short.
+    /// Returns `short` in a short run, else `full`.
     pub fn size<T>(&self, full: T, short: T) -> T {
         if self.is_short { short } else { full }
     }

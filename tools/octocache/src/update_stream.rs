@@ -3,18 +3,17 @@ use voxtile::scan::RayWalk;
 use voxtile::sensor::{Evidence, Observation, SensorModel};
 use voxtile::space::{Grid, MortonCode, VoxelIndex, VoxelKey};
 
-/// One update of a voxel: what a ray says about it.
+/// One update of a voxel by a ray.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Update {
-    /// Which voxel.
     pub voxel: VoxelIndex,
     /// Whether the ray ends there.
     pub is_hit: bool,
 }
 
-/// What every ray says about voxels, in the order of OctoMap's `insertPointCloudRays`: ray by ray, from the sensor
-/// outward. No more than `most` updates.
-pub fn updates(grid: &Grid, scans: &[Scan], most: usize) -> Vec<Update> {
+/// Updates by every ray, in the order of OctoMap's `insertPointCloudRays`: ray by ray, from the sensor outward. Stops
+/// after `max` updates.
+pub fn updates(grid: &Grid, scans: &[Scan], max: usize) -> Vec<Update> {
     let mut updates = Vec::new();
     for scan in scans {
         let Some(start) = grid.voxel_of(scan.origin) else { continue };
@@ -24,8 +23,8 @@ pub fn updates(grid: &Grid, scans: &[Scan], most: usize) -> Vec<Update> {
                 RayWalk::between(grid.to_voxel_units(scan.origin), start, grid.to_voxel_units(point), last);
             walk.for_each_before_end(|voxel| updates.push(Update { voxel, is_hit: false }));
             updates.push(Update { voxel: last, is_hit: true });
-            if updates.len() >= most {
-                updates.truncate(most);
+            if updates.len() >= max {
+                updates.truncate(max);
                 return updates;
             }
         }
@@ -33,7 +32,7 @@ pub fn updates(grid: &Grid, scans: &[Scan], most: usize) -> Vec<Update> {
     updates
 }
 
-/// The value (log-odds) that each update gives its voxel if they come in this order.
+/// Log-odds of the voxel after each update, in this order.
 pub fn accumulated(model: &SensorModel, updates: &[Update]) -> Vec<(MortonCode, f32)> {
     let mut known: rustc_hash::FxHashMap<VoxelIndex, Evidence> = Default::default();
     let values = updates.iter().map(|update| {
@@ -53,9 +52,9 @@ mod tests {
     use std::path::Path;
     use voxtile::{InMemoryMapper, InsertMode, MapView, Mapper};
 
-    /// Against the mapper: the last value of every voxel is the one in its table.
+    /// The last value of every voxel is the one in the table of the mapper's map.
     #[test]
-    fn the_updates_make_the_map_of_the_mapper_where_every_ray_counts() {
+    fn the_updates_give_the_map_of_the_mapper() {
         let scans = datasets(Path::new(""))[1].scans(1).unwrap();
         let config = map_config(0.2).unwrap().with_insert_mode(InsertMode::PerRay);
         let updates = updates(&config.grid, &scans, usize::MAX);

@@ -5,56 +5,55 @@ use serde::de::{DeserializeOwned, IgnoredAny};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-/// The programs that are compared: each does one thing and prints one line of JSON.
+/// The programs to compare: each does one task and prints one line of JSON.
 pub struct Contenders {
     /// OctoMap as its users compile it.
     pub octomap: PathBuf,
     /// OctoMap compiled for this machine.
     pub octomap_native: Option<PathBuf>,
-    /// voxtile.
     pub voxtile: PathBuf,
-    /// Short work is repeated until so many seconds were timed.
+    /// Short tasks are repeated until this many seconds are measured.
     pub least_seconds: f64,
-    /// Queries of a kind.
+    /// Number of point queries of each kind.
     pub points: usize,
 }
 
-/// How the rays of a scan count.
+/// How rays update voxels.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub enum Counting {
-    /// Once a voxel a scan, cut at the max range.
+    /// Once per voxel and scan, cut at the max range.
     PerScan,
-    /// Every one, uncut: OctoMap's `insertPointCloudRays` ignores the max range.
+    /// Each ray, without cut: OctoMap's `insertPointCloudRays` ignores the max range.
     PerRay,
-    /// Once a voxel a scan, weighted by intensity; voxtile's alone.
+    /// Once per voxel and scan, weighted by intensity; voxtile only.
     Iwlo,
 }
 
-/// How a build of voxtile takes the scans.
+/// How voxtile inserts the scans.
 #[derive(Clone, Copy, PartialEq, Eq)]
-pub enum Way {
+pub enum Insertion {
     /// One by one.
     OneByOne,
-    /// Handed in together.
+    /// All in one call.
     Together,
-    /// Octrees up to date after every scan.
+    /// One by one, with the octrees updated after every scan.
     Sync,
-    /// Handed in together, out of core, and a flush in the end.
+    /// All in one call, out of core, with a flush at the end.
     Flush,
 }
 
-/// Scans of a workload and how they count.
+/// Scans of a workload, and how they update voxels.
 #[derive(Clone, Copy)]
 pub struct Job<'a> {
     pub workload: &'a Workload,
     pub files: &'a Files,
-    /// Take no more than so many scans.
+    /// Maximum number of scans.
     pub scans: usize,
     pub counting: Counting,
 }
 
 impl Contenders {
-    /// One run of OctoMap: insertions, and the questions and `writeBinary` if `with_all`.
+    /// Runs OctoMap once: insertions, and also queries and `writeBinary` if `with_all`.
     pub fn octomap(&self, program: &Path, job: &Job<'_>, with_all: bool) -> Result<OctomapOutcome> {
         let mut command = octomap_command(program, job);
         if with_all {
@@ -66,7 +65,7 @@ impl Contenders {
         outcome(command)
     }
 
-    /// Has OctoMap write its finest voxels.
+    /// Writes OctoMap's finest voxels to a file.
     pub fn dump_octomap(&self, job: &Job<'_>, file: &Path) -> Result<()> {
         let mut command = octomap_command(&self.octomap, job);
         command.arg("--dump").arg(file);
@@ -74,25 +73,25 @@ impl Contenders {
     }
 
     /// Times a build of voxtile.
-    pub fn build(&self, job: &Job<'_>, threads: u32, way: Way) -> Result<BuildOutcome> {
+    pub fn build(&self, job: &Job<'_>, threads: u32, insertion: Insertion) -> Result<BuildOutcome> {
         let mut command = self.voxtile_command("build", job);
         command.env("RAYON_NUM_THREADS", threads.to_string());
         command.arg("--least-seconds").arg(self.least_seconds.to_string());
-        match way {
-            Way::OneByOne => {}
-            Way::Together => drop(command.arg("--together")),
-            Way::Sync => drop(command.arg("--sync")),
-            Way::Flush => drop(command.arg("--together").arg("--folder").arg(&job.files.folder)),
+        match insertion {
+            Insertion::OneByOne => {}
+            Insertion::Together => drop(command.arg("--together")),
+            Insertion::Sync => drop(command.arg("--sync")),
+            Insertion::Flush => drop(command.arg("--together").arg("--folder").arg(&job.files.folder)),
         }
         outcome(command)
     }
 
-    /// Weighs a map of voxtile.
+    /// Measures the memory of a map of voxtile.
     pub fn memory(&self, job: &Job<'_>) -> Result<MemoryOutcome> {
         outcome(self.voxtile_command("memory", job))
     }
 
-    /// Writes the points of the questions.
+    /// Writes the points to query.
     pub fn write_points(&self, job: &Job<'_>) -> Result<()> {
         let mut command = self.voxtile_command("write-points", job);
         command.arg("--anywhere").arg(job.files.anywhere()).arg("--known").arg(job.files.known());
@@ -100,7 +99,7 @@ impl Contenders {
         outcome::<IgnoredAny>(command).map(drop)
     }
 
-    /// Times the questions to voxtile.
+    /// Times the queries of voxtile.
     pub fn questions(&self, job: &Job<'_>) -> Result<QuestionsOutcome> {
         let mut command = self.voxtile_command("questions", job);
         command.arg("--anywhere").arg(job.files.anywhere()).arg("--known").arg(job.files.known());
@@ -108,7 +107,7 @@ impl Contenders {
         outcome(command)
     }
 
-    /// Has voxtile write its voxels.
+    /// Writes voxtile's voxels to a file.
     pub fn dump_voxtile(&self, job: &Job<'_>, file: &Path) -> Result<()> {
         let mut command = self.voxtile_command("dump", job);
         command.arg("--output").arg(file);
@@ -131,7 +130,7 @@ impl Contenders {
 }
 
 impl Job<'_> {
-    /// Where rays are cut.
+    /// Maximum range of the rays, in metres.
     pub fn max_range_m(&self) -> Option<f64> {
         (self.counting != Counting::PerRay).then_some(MAX_RANGE_M)
     }
@@ -158,14 +157,14 @@ fn octomap_command(program: &Path, job: &Job<'_>) -> Command {
     command
 }
 
-/// Runs a contender to its end and reads its line. What it says beside is shown if it fails.
+/// Runs a contender and parses its line. Its standard error is shown if it fails.
 fn outcome<T: DeserializeOwned>(mut command: Command) -> Result<T> {
     let program = command.get_program().to_string_lossy().into_owned();
     let output = command
         .output()
-        .with_context(|| format!("{program}: cannot start it; tools/bench.sh peers builds it"))?;
-    let said = String::from_utf8_lossy(&output.stderr);
-    ensure!(output.status.success(), "{} ({}; {command:?})", said.trim(), output.status);
+        .with_context(|| format!("{program}: cannot start; build it with tools/bench.sh peers"))?;
+    let errors = String::from_utf8_lossy(&output.stderr);
+    ensure!(output.status.success(), "{} ({}; {command:?})", errors.trim(), output.status);
     serde_json::from_slice(&output.stdout)
-        .with_context(|| format!("{program}: printed another line than it should; {command:?}"))
+        .with_context(|| format!("{program}: unexpected output; {command:?}"))
 }

@@ -10,28 +10,28 @@ use voxtile::sensor::{Iwlo, SensorModel};
 use voxtile::{InsertMode, MapConfig};
 use workload::ScanReader;
 
-/// By how much OctoMap's log-odds, sums of `f32`, may differ.
+/// Tolerance for OctoMap's log-odds, which are sums of `f32`.
 const TOLERANCE: f64 = 1e-3;
-/// Share of the voxels that must agree with OctoMap.
+/// Minimum share of the voxels that agree with OctoMap.
 const MIN_AGREEMENT: f64 = 0.999;
-/// The same where every ray counts: a voxel differs if any of the many rays through it grazes it on one side only.
+/// The same if every ray counts: a voxel differs if one of the many rays through it grazes it on one side only.
 const MIN_AGREEMENT_PER_RAY: f64 = 0.99;
 const TILE_SIZE_M: f64 = 10.0;
 
-/// Where a map differs from the naive one.
+/// Differences between a map and the naive one.
 #[derive(Debug, Default, PartialEq)]
 struct Difference {
-    /// Voxels that either knows.
+    /// Voxels in either map.
     voxels: usize,
-    /// That only the naive map knows.
+    /// Voxels only in the naive map.
     missing: usize,
-    /// That only the other knows, or knows twice.
+    /// Voxels only in the other map, or twice in it.
     extra: usize,
-    /// Of which they think differently.
+    /// Voxels with other values.
     other_value: usize,
 }
 
-/// Both compared with the naive map, voxel by voxel, after the first scans of a workload.
+/// Compares both with the naive map, voxel by voxel, after the first scans of a workload.
 pub fn rows(
     workload: &Workload,
     files: &Files,
@@ -55,7 +55,7 @@ pub fn rows(
         let voxtile = difference(&naive, &read_voxels(&dump)?, |voxel, &(log_odds_bits, count)| {
             (voxel.log_odds.to_bits(), voxel.observation_count) == (log_odds_bits, count)
         });
-        let what = format!("voxels unlike the naive map's, {scans} scan(s){what}");
+        let what = format!("voxels that differ from the naive map's, {scans} scan(s){what}");
         if voxtile.count() > 0 {
             faults.push(format!("{}: {what}: voxtile {}", workload.name, voxtile.text()));
         }
@@ -102,7 +102,7 @@ fn naive_map(job: &Job<'_>) -> Result<Voxels> {
     Ok(map.voxels)
 }
 
-/// Compares the voxels of a contender; `agrees` tells whether it thinks of a voxel as the naive map does.
+/// Compares the voxels of a contender; `agrees` compares a voxel with the evidence in the naive map.
 fn difference(
     naive: &Voxels,
     voxels: &[VoxelRecord],

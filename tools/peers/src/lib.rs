@@ -1,4 +1,4 @@
-//! What the contenders of the comparison and its driver hand to one another.
+//! Data that the contenders of the comparison and its driver exchange.
 
 mod outcome;
 mod points;

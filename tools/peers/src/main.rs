@@ -1,4 +1,4 @@
-//! Compares voxtile with OctoMap on the same scans and prints one table. `tools/bench.sh peers` builds and starts it.
+//! Compares voxtile with OctoMap on the same scans and prints one table. `tools/bench.sh peers` builds and runs it.
 
 mod contenders;
 mod exactness;
@@ -15,25 +15,25 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use workloads::Workload;
 
-/// Compares voxtile with OctoMap and prints a table in Markdown; exits with 1 if one of them maps wrongly.
+/// Compares voxtile with OctoMap and prints a table in Markdown; exits with 1 if one of the maps is wrong.
 #[derive(Debug, Parser)]
 #[command(name = "peers", version)]
 struct Arguments {
     #[command(flatten)]
     options: Options,
-    /// Take the recorded data sets too
+    /// Also use the recorded data sets
     #[arg(long)]
     real: bool,
-    /// The contender of OctoMap
+    /// OctoMap's contender
     #[arg(long, value_name = "PROGRAM")]
     octomap: PathBuf,
-    /// The contender of OctoMap, compiled for this very machine
+    /// OctoMap's contender, compiled for this machine
     #[arg(long, value_name = "PROGRAM")]
     octomap_native: Option<PathBuf>,
-    /// Which OctoMap that is, for the table's head
+    /// Version of OctoMap, for the head of the table
     #[arg(long, value_name = "WORDS", default_value = "of unknown version")]
     octomap_version: String,
-    /// The contender of voxtile
+    /// voxtile's contender
     #[arg(long, value_name = "PROGRAM")]
     voxtile: PathBuf,
 }
@@ -42,10 +42,10 @@ fn main() -> ExitCode {
     report::exit_code("peers", run(&Arguments::parse()))
 }
 
-/// Whether both contenders map as they should.
+/// Returns whether both contenders build correct maps.
 fn run(arguments: &Arguments) -> Result<bool> {
     let Arguments { options, .. } = arguments;
-    let mut workloads = if options.short { workloads::short() } else { workloads::made_up() };
+    let mut workloads = if options.short { workloads::short() } else { workloads::synthetic() };
     if arguments.real {
         workloads.extend(workloads::real(&options.data));
     }
@@ -77,13 +77,13 @@ fn run(arguments: &Arguments) -> Result<bool> {
     Ok(faults.is_empty())
 }
 
-/// The machine, what was compiled how, and what to type to measure again.
+/// The machine, the compiler options, and the command that repeats the measurement.
 fn head(arguments: &Arguments) -> String {
     let Arguments { options, octomap_version, .. } = arguments;
     let real = if arguments.real { " --real" } else { "" };
     format!(
         "Machine: {}. OctoMap {octomap_version}, g++ -O2 -DNDEBUG -ffp-contract=off; voxtile: cargo's release profile, \
-         no CPU of its own named.\nCommand: `{}{real}`. {} run(s).\n",
+         no target CPU.\nCommand: `{}{real}`. {} run(s).\n",
         report::processor(),
         options.command("peers", options.only.as_deref()),
         options.runs_or(3),

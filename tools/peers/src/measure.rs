@@ -1,9 +1,9 @@
-use crate::contenders::{Contenders, Counting, Job, Way};
+use crate::contenders::{Contenders, Counting, Insertion, Job};
 use crate::table::{Pairs, Row, Target};
 use crate::workloads::{Files, Workload};
 use anyhow::{Context, Result};
 
-/// Of all voxels and of all answers, so many may differ between the contenders (rays that graze a voxel's edge).
+/// Maximum share of voxels and of answers that may differ between the contenders: rays may graze the edge of a voxel.
 const MAX_DIFFERENT: f64 = 1e-3;
 
 /// The samples of a workload.
@@ -27,7 +27,7 @@ struct Samples {
     known_answers: Pairs,
 }
 
-/// Speed and memory of both on a workload: one run of OctoMap, then those of voxtile, and again.
+/// Measures speed and memory of both on a workload. Each run starts OctoMap, then voxtile's tasks.
 pub fn rows(
     workload: &Workload,
     files: &Files,
@@ -52,17 +52,17 @@ pub fn rows(
 }
 
 impl Samples {
-    /// One run of everything.
+    /// Adds one run of all tasks.
     fn add(&mut self, contenders: &Contenders, job: &Job<'_>) -> Result<()> {
         let octomap = contenders.octomap(&contenders.octomap, job, true)?;
-        let one = contenders.build(job, 1, Way::OneByOne)?;
-        let two = contenders.build(job, 2, Way::OneByOne)?;
-        let together = contenders.build(job, 2, Way::Together)?;
-        let synced = contenders.build(job, 2, Way::Sync)?;
-        let flushed = contenders.build(job, 2, Way::Flush)?;
+        let one = contenders.build(job, 1, Insertion::OneByOne)?;
+        let two = contenders.build(job, 2, Insertion::OneByOne)?;
+        let together = contenders.build(job, 2, Insertion::Together)?;
+        let synced = contenders.build(job, 2, Insertion::Sync)?;
+        let flushed = contenders.build(job, 2, Insertion::Flush)?;
         let memory = contenders.memory(job)?;
         let questions = contenders.questions(job)?;
-        let asked = octomap.questions.context("OctoMap's contender asked no questions")?;
+        let answers = octomap.questions.context("OctoMap's contender ran no queries")?;
         let write_s = octomap.write_s.context("OctoMap's contender wrote no file")?;
 
         let scans = octomap.scans as f64;
@@ -73,7 +73,7 @@ impl Samples {
         self.synced.push(a_scan(octomap.wall_s), a_scan(synced.wall_s));
         self.flushed.push(a_scan(octomap.wall_s + write_s), a_scan(flushed.wall_s));
         if job.files.intensities.is_some() {
-            let iwlo = contenders.build(&Job { counting: Counting::Iwlo, ..*job }, 1, Way::OneByOne)?;
+            let iwlo = contenders.build(&Job { counting: Counting::Iwlo, ..*job }, 1, Insertion::OneByOne)?;
             self.iwlo.push(a_scan(octomap.cpu_s), a_scan(iwlo.cpu_s));
         }
         if let Some(program) = &contenders.octomap_native {
@@ -82,7 +82,7 @@ impl Samples {
         }
         let rays = Job { scans: job.workload.ray_scans, counting: Counting::PerRay, ..*job };
         let octomap_rays = contenders.octomap(&contenders.octomap, &rays, false)?;
-        let voxtile_rays = contenders.build(&rays, 1, Way::OneByOne)?;
+        let voxtile_rays = contenders.build(&rays, 1, Insertion::OneByOne)?;
         let ray_scans = octomap_rays.scans as f64;
         self.per_ray.push(octomap_rays.cpu_s / ray_scans, voxtile_rays.cpu_s / ray_scans);
 
@@ -93,10 +93,10 @@ impl Samples {
         self.resident.push(theirs(octomap.resident_bytes), ours(memory.resident_bytes));
         self.synced_resident.push(theirs(octomap.resident_bytes), ours(memory.synced_resident_bytes));
         self.voxels.push(octomap.voxels as f64, memory.voxels as f64);
-        self.anywhere.push(asked.anywhere.ns, questions.anywhere.ns);
-        self.known.push(asked.known.ns, questions.known.ns);
+        self.anywhere.push(answers.anywhere.ns, questions.anywhere.ns);
+        self.known.push(answers.known.ns, questions.known.ns);
         self.known_answers.push(
-            (asked.anywhere.known + asked.known.known) as f64,
+            (answers.anywhere.known + answers.known.known) as f64,
             (questions.anywhere.known + questions.known.known) as f64,
         );
         Ok(())
@@ -108,7 +108,7 @@ impl Samples {
             ("insert, CPU of 1 thread", &self.one_thread, targets.one_thread),
             ("the same, OctoMap -O3 -march=native", &self.native, None),
             ("insert, wall, 2 threads", &self.two_threads, targets.two_threads),
-            ("insert, scans together, wall, 2 threads", &self.together, None),
+            ("insert, several scans concurrently, wall, 2 threads", &self.together, None),
             ("insert, octrees up to date after every scan, wall, 2 threads", &self.synced, targets.synced),
             ("scans to flushed files, wall, 2 threads", &self.flushed, targets.flushed),
             ("insert every ray, CPU of 1 thread", &self.per_ray, targets.per_ray),
@@ -120,8 +120,8 @@ impl Samples {
             ("memory, growth of the process, octrees up to date", &self.synced_resident, None),
         ];
         let questions = [
-            ("point question, anywhere, CPU", &self.anywhere, targets.question),
-            ("point question, known voxels, CPU", &self.known, None),
+            ("point query, anywhere, CPU", &self.anywhere, targets.question),
+            ("point query, known voxels, CPU", &self.known, None),
         ];
         let mut rows: Vec<Row> =
             times.map(|(what, pairs, target)| row(what, workload, pairs, target, milliseconds)).into();
@@ -163,7 +163,7 @@ fn row(
     }
 }
 
-/// Seconds a scan, in words.
+/// Text for seconds per scan, in milliseconds.
 fn milliseconds(seconds: f64) -> String {
     format!("{:.1} ms a scan", 1e3 * seconds)
 }

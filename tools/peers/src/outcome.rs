@@ -1,34 +1,34 @@
 use serde::{Deserialize, Serialize};
 
-/// How long voxtile takes to build a map from the whole stream.
+/// Time for voxtile to build a map from the whole stream.
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub struct BuildOutcome {
     /// Scans in the stream.
     pub scans: u64,
-    /// Builds that the times are the mean of.
+    /// Number of builds for the mean times.
     pub builds: u32,
-    /// CPU seconds of the process, all threads, a build.
+    /// CPU seconds of the process (all threads) per build.
     pub cpu_s: f64,
-    /// Seconds on the clock, a build.
+    /// Wall time per build, in seconds.
     pub wall_s: f64,
 }
 
-/// What a map of voxtile weighs.
+/// Memory of a map of voxtile.
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub struct MemoryOutcome {
-    /// Voxels that the map knows.
+    /// Voxels in the map.
     pub voxels: u64,
-    /// Bytes that the map counts, after the last scan.
+    /// Bytes that the map reports after the last scan.
     pub bytes: u64,
-    /// Bytes by which the process had grown then since before the first scan.
+    /// Growth of the process from the first scan to the last, in bytes.
     pub resident_bytes: u64,
-    /// Bytes that the map counts with all octrees up to date.
+    /// Bytes that the map reports with all octrees up to date.
     pub synced_bytes: u64,
-    /// Bytes by which the process had grown then.
+    /// Growth of the process from the first scan, with all octrees up to date, in bytes.
     pub synced_resident_bytes: u64,
 }
 
-/// How a map answered questions for points.
+/// Results of point queries.
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub struct QuestionsOutcome {
     /// Points anywhere in the bounding box of the known voxels.
@@ -37,34 +37,34 @@ pub struct QuestionsOutcome {
     pub known: Answers,
 }
 
-/// The answers to one file of points.
+/// Results for one file of points.
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub struct Answers {
-    /// Nanoseconds of CPU a question; asked on one thread.
+    /// CPU nanoseconds per query, on one thread.
     pub ns: f64,
-    /// How many of the points were known.
+    /// Number of known points.
     pub known: u64,
-    /// How many of the points were occupied.
+    /// Number of occupied points.
     pub occupied: u64,
 }
 
-/// Everything OctoMap is asked for, in one run.
+/// Results of a run of OctoMap.
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub struct OctomapOutcome {
     /// Scans inserted.
     pub scans: u64,
     /// CPU seconds of all insertions.
     pub cpu_s: f64,
-    /// Seconds on the clock of all insertions.
+    /// Wall time of all insertions, in seconds.
     pub wall_s: f64,
-    /// Finest voxels that the tree knows.
+    /// Number of finest voxels in the tree.
     pub voxels: u64,
-    /// What `memoryUsage` says.
+    /// Bytes from `memoryUsage`.
     pub bytes: u64,
-    /// Bytes by which the process grew during the insertions.
+    /// Growth of the process during the insertions, in bytes.
     pub resident_bytes: u64,
-    /// Answers, if there were questions.
+    /// Results of queries, if any.
     pub questions: Option<QuestionsOutcome>,
-    /// Seconds on the clock of `writeBinary`, if it was asked for.
+    /// Wall time of `writeBinary` in seconds, if requested.
     pub write_s: Option<f64>,
 }

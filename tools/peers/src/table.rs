@@ -1,22 +1,22 @@
 use Target::{AtLeast, AtMost};
 
-/// A line of the table.
+/// A row of the table.
 pub struct Row {
-    /// What was measured.
+    /// Name of the measurement.
     pub what: String,
-    /// On which workload.
+    /// Name of the workload.
     pub workload: String,
     /// OctoMap's figure.
     pub octomap: String,
     /// voxtile's figure.
     pub voxtile: String,
-    /// OctoMap's figure by voxtile's: above 1, voxtile is better.
+    /// OctoMap's figure divided by voxtile's: above 1, voxtile is better.
     pub ratio: Option<Ratio>,
-    /// What is aimed at, and what it is compared with.
+    /// Target, and the value that is compared with it.
     pub target: Option<(Target, f64)>,
 }
 
-/// A ratio of medians, and the smallest and largest of a single run.
+/// Ratio of medians, with the smallest and largest ratio of a single run.
 #[derive(Clone, Copy)]
 pub struct Ratio {
     pub of_medians: f64,
@@ -24,7 +24,7 @@ pub struct Ratio {
     pub most: f64,
 }
 
-/// What is aimed at: floor and, where there is one, goal.
+/// A target: floor and, optionally, goal.
 #[derive(Clone, Copy)]
 pub enum Target {
     /// For ratios.
@@ -33,7 +33,7 @@ pub enum Target {
     AtMost(f64, Option<f64>),
 }
 
-/// The samples of both, run by run.
+/// The samples of both contenders, run by run.
 #[derive(Default)]
 pub struct Pairs(Vec<[f64; 2]>);
 
@@ -43,7 +43,6 @@ impl Pairs {
         self.0.push([octomap, voxtile]);
     }
 
-    /// Whether nothing was measured.
     pub fn is_empty(&self) -> bool {
         self.0.is_empty()
     }
@@ -67,7 +66,7 @@ impl Pairs {
 }
 
 impl Ratio {
-    /// From the smallest to the largest of single runs; nothing where there was one.
+    /// Smallest and largest ratio of single runs; empty for a single run.
     fn spread(&self) -> String {
         if self.least == self.most {
             return String::new();
@@ -99,7 +98,7 @@ impl Target {
     }
 }
 
-/// The rows as a table in Markdown.
+/// Formats the rows as a table in Markdown.
 pub fn markdown(rows: &[Row]) -> String {
     let mut text = String::from(
         "| what | workload | OctoMap | voxtile | ratio | of single runs | floor | goal | reached |\n\
@@ -119,7 +118,7 @@ pub fn markdown(rows: &[Row]) -> String {
     text
 }
 
-/// The middle one, or the mean of the two in the middle; NaN of nothing.
+/// The middle value, or the mean of the two middle values; NaN without values.
 fn median(mut values: Vec<f64>) -> f64 {
     values.sort_by(f64::total_cmp);
     match values.len() {
@@ -140,7 +139,7 @@ mod tests {
     }
 
     #[test]
-    fn a_target_is_missed_or_reached_as_far_as_its_goal() {
+    fn a_target_is_missed_or_reaches_floor_or_goal() {
         let ratio = AtLeast(21.0, Some(42.0));
         assert_eq!([20.9, 21.0, 42.0].map(|value| ratio.verdict(value)), ["missed", "floor", "goal"]);
         let bytes = AtMost(16.0, Some(8.0));
@@ -150,7 +149,7 @@ mod tests {
     }
 
     #[test]
-    fn ratios_are_of_medians_and_keep_the_range_of_single_runs() {
+    fn ratios_are_of_medians_with_the_range_of_single_runs() {
         let mut pairs = Pairs::default();
         [[10.0, 1.0], [12.0, 2.0], [90.0, 3.0]]
             .into_iter()

@@ -4,14 +4,14 @@ use std::io::{self, Write};
 use std::path::Path;
 use voxtile::space::VoxelIndex;
 
-/// A finest voxel as a contender knows it.
+/// A finest voxel of a contender.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct VoxelRecord {
-    /// Its index along x, y and z.
+    /// Index along x, y and z.
     pub index: VoxelIndex,
-    /// Its updates; 0 from a contender that does not count them.
+    /// Number of updates; 0 from a contender that does not count them.
     pub observation_count: i32,
-    /// Its log-odds; those of a contender that keeps `f32`, widened.
+    /// Log-odds, widened if the contender stores `f32`.
     pub log_odds: f64,
 }
 
@@ -22,7 +22,7 @@ const RECORD_BYTES: usize = 24;
 ///
 /// # Errors
 ///
-/// An output that refuses.
+/// Fails if the output cannot be written.
 pub fn write_voxels(out: &mut impl Write, voxels: impl Iterator<Item = VoxelRecord>) -> io::Result<()> {
     for voxel in voxels {
         for number in voxel.index.into_iter().chain([voxel.observation_count]) {
@@ -33,15 +33,15 @@ pub fn write_voxels(out: &mut impl Write, voxels: impl Iterator<Item = VoxelReco
     out.flush()
 }
 
-/// Reads what [`write_voxels`], or the contender in C++, wrote.
+/// Reads voxels written by [`write_voxels`] or by the contender in C++.
 ///
 /// # Errors
 ///
-/// A file that cannot be read or does not hold whole voxels.
+/// Fails if the file cannot be read or ends within a voxel.
 pub fn read_voxels(path: &Path) -> Result<Vec<VoxelRecord>> {
     let bytes = fs::read(path).with_context(|| format!("{}: cannot read the voxels", path.display()))?;
     let (records, rest) = bytes.as_chunks::<RECORD_BYTES>();
-    ensure!(rest.is_empty(), "{}: ends within a voxel; write it anew", path.display());
+    ensure!(rest.is_empty(), "{}: ends within a voxel; write it again", path.display());
     Ok(records.iter().map(voxel_of).collect())
 }
 
@@ -59,7 +59,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_written_is_read() {
+    fn written_voxels_are_read_back() {
         let voxels = [
             VoxelRecord { index: [-1, 2, i32::MAX], observation_count: 3, log_odds: -0.4 },
             VoxelRecord { index: [i32::MIN, 0, 1], observation_count: 0, log_odds: 1e-300 },

@@ -6,65 +6,65 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use workload::{ScanWriter, SurveyName};
 
-/// Scans, and at which resolution they are mapped.
+/// Scans, and the resolution of their map.
 pub struct Workload {
-    /// What the table calls it.
+    /// Name in the table.
     pub name: String,
     source: Source,
-    /// Scans of the stream.
+    /// Number of scans in the stream.
     pub scans: usize,
-    /// Scans where every ray counts.
+    /// Number of scans if every ray counts.
     pub ray_scans: usize,
-    /// Scans that the naive map takes too.
+    /// Number of scans for the naive map.
     pub exact_scans: usize,
     /// Edge of a voxel in metres.
     pub resolution_m: f64,
-    /// What is aimed at.
+    /// Targets of the workload.
     pub targets: Targets,
 }
 
 enum Source {
-    MadeUp(SurveyName),
+    Synthetic(SurveyName),
     /// A folder of scans and poses.
     Real(PathBuf),
 }
 
-/// What is aimed at in a workload; ratios are OctoMap's time by voxtile's.
+/// Targets of a workload; ratios are OctoMap's time divided by voxtile's.
 #[derive(Clone, Copy, Default)]
 pub struct Targets {
     /// Insertion, CPU time of one thread.
     pub one_thread: Option<Target>,
     /// Insertion, wall time of two threads.
     pub two_threads: Option<Target>,
-    /// The same, with the octrees up to date after every scan.
+    /// The same, with the octrees updated after every scan.
     pub synced: Option<Target>,
     /// Scans to a flushed map on disk.
     pub flushed: Option<Target>,
-    /// Bytes of memory a voxel.
+    /// Bytes of memory per voxel.
     pub bytes: Option<Target>,
-    /// Nanoseconds a question.
+    /// Nanoseconds per query.
     pub question: Option<Target>,
-    /// Insertion where every ray counts, CPU time of one thread.
+    /// Insertion if every ray counts, CPU time of one thread.
     pub per_ray: Option<Target>,
 }
 
 /// The files of a workload.
 pub struct Files {
-    /// Where they lie, and where more may.
+    /// Their folder, with space for other files.
     pub folder: PathBuf,
     /// The scans.
     pub stream: PathBuf,
-    /// Their intensities, where there are some.
+    /// Their intensities, if any.
     pub intensities: Option<PathBuf>,
 }
 
-/// Cuts rays in all workloads, in metres.
+/// Maximum range in all workloads, in metres.
 pub const MAX_RANGE_M: f64 = 60.0;
-/// Seed of the made-up surveys.
+/// Seed of the synthetic surveys.
 const SEED: u64 = 1;
 
-/// The four workloads that have targets.
-pub fn made_up() -> Vec<Workload> {
+/// The four workloads with targets.
+pub fn synthetic() -> Vec<Workload> {
     use SurveyName::{Indoor, Street};
     vec![
         workload(Street, 0.2, 20, [21.0, 42.0, 36.0, 75.0, 25.0, 15.0, 50.0]),
@@ -74,9 +74,9 @@ pub fn made_up() -> Vec<Workload> {
     ]
 }
 
-/// Two of them with few scans.
+/// Two of them, with few scans.
 pub fn short() -> Vec<Workload> {
-    let mut workloads = made_up();
+    let mut workloads = synthetic();
     workloads.retain(|workload| [0.2, 0.1].contains(&workload.resolution_m));
     workloads.retain(|workload| workload.scans == 20);
     for workload in &mut workloads {
@@ -85,13 +85,14 @@ pub fn short() -> Vec<Workload> {
     workloads
 }
 
-/// `numbers`: floor and goal of one thread, of two threads, floors of synced and flushed, most nanoseconds a question.
+/// `numbers`: floor and goal for one thread and for two threads, floors for synced and flushed, maximum nanoseconds per
+/// query.
 fn workload(survey: SurveyName, resolution_m: f64, scans: usize, numbers: [f64; 7]) -> Workload {
     let [one, one_goal, two, two_goal, synced, flushed, question_ns] = numbers;
     let name = survey.name();
     Workload {
         name: format!("{name} {resolution_m} m"),
-        source: Source::MadeUp(survey),
+        source: Source::Synthetic(survey),
         scans,
         ray_scans: 2,
         exact_scans: 2,
@@ -108,7 +109,7 @@ fn workload(survey: SurveyName, resolution_m: f64, scans: usize, numbers: [f64; 
     }
 }
 
-/// The real data sets that are there.
+/// The recorded data sets that are present.
 pub fn real(data: &Path) -> Vec<Workload> {
     let sets = [("mulran_riverside02_a", 0.2, 60), ("fastlio_hku_1", 0.2, 200), ("balm_os0_hall", 0.1, 20)];
     let mut workloads = Vec::new();
@@ -128,7 +129,7 @@ pub fn real(data: &Path) -> Vec<Workload> {
 }
 
 impl Workload {
-    /// The name that `--only` takes: `street-0.2`.
+    /// Value of `--only` for the workload: `street-0.2`.
     pub fn part(&self) -> String {
         self.name.trim_end_matches(" m").replace('`', "").replace(' ', "-")
     }
@@ -138,10 +139,10 @@ impl Workload {
         eprintln!("{}: writing {} scans", self.name, self.scans);
         let stream = folder.join("scans");
         let intensities = match &self.source {
-            Source::MadeUp(survey) => {
+            Source::Synthetic(survey) => {
                 let intensities = folder.join("intensities");
-                write_made_up(*survey, self.scans, &stream, &intensities).with_context(|| {
-                    format!("{}: cannot write the scans; is there room?", folder.display())
+                write_synthetic(*survey, self.scans, &stream, &intensities).with_context(|| {
+                    format!("{}: cannot write the scans; check the free disk space", folder.display())
                 })?;
                 Some(intensities)
             }
@@ -154,14 +155,19 @@ impl Workload {
     }
 }
 
-fn write_made_up(survey: SurveyName, scans: usize, stream: &Path, intensities: &Path) -> std::io::Result<()> {
+fn write_synthetic(
+    survey: SurveyName,
+    scans: usize,
+    stream: &Path,
+    intensities: &Path,
+) -> std::io::Result<()> {
     let created = |path| File::create(path).map(BufWriter::new);
     let mut writer = ScanWriter::new(created(stream)?, Some(created(intensities)?));
     survey.scans(SEED, 0, SurveyName::RAYS).take(scans).try_for_each(|scan| writer.write(&scan))?;
     writer.flush()
 }
 
-/// The points of a real data set, rounded to `f32` as OctoMap needs them.
+/// Writes the points of a recorded data set, rounded to `f32` for OctoMap.
 fn write_real(data: &Path, scans: usize, stream: &Path) -> Result<()> {
     let out = File::create(stream).with_context(|| format!("{}: cannot create", stream.display()))?;
     let status = Command::new("python3")

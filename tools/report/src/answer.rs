@@ -4,12 +4,12 @@ use anyhow::Result;
 use std::path::Path;
 use textwrap::{Options, WordSplitter};
 
-/// What a question yields.
+/// Result of a question.
 #[derive(Default)]
 pub struct Answer {
-    /// Numbers.
+    /// Tables.
     pub tables: Vec<Table>,
-    /// The same to look at.
+    /// Plots.
     pub plots: Vec<Plot>,
 }
 
@@ -18,13 +18,14 @@ impl Answer {
     ///
     /// # Errors
     ///
-    /// A file that cannot be written.
+    /// Fails if a file cannot be written.
     pub fn write(&self, folder: &Path) -> Result<()> {
         self.tables.iter().try_for_each(|table| table.write_csv(folder))?;
         self.plots.iter().try_for_each(|plot| plot.write(folder))
     }
 
-    /// Tables and plots for the page beside the folder `folder`, below what was typed and where it ran.
+    /// Text with tables and plots for the page, after the command and the machine. `folder` is the folder of the files,
+    /// next to the page.
     pub fn markdown(&self, folder: &str, command: &str, machine: &str) -> String {
         let mut text = wrapped(&format!("`{command}`; {machine}."));
         for table in &self.tables {
@@ -42,10 +43,10 @@ impl Answer {
     }
 }
 
-/// Most characters of a line of prose.
+/// Maximum length of a line of prose.
 const LINE_WIDTH: usize = 120;
 
-/// A paragraph in lines of at most [`LINE_WIDTH`] characters; a longer word has a line of its own.
+/// Wraps a paragraph at [`LINE_WIDTH`] characters; a longer word gets its own line.
 fn wrapped(paragraph: &str) -> String {
     let options = Options::new(LINE_WIDTH).break_words(false).word_splitter(WordSplitter::NoHyphenation);
     textwrap::fill(paragraph, options) + "\n"
@@ -56,7 +57,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn prose_is_wrapped_between_words_and_keeps_all_of_them() {
+    fn prose_is_wrapped_between_words_and_complete() {
         let caption = "Bytes of a long-lived map, by flush, and what readers see of it. ".repeat(6);
         let table = Table::new("a_file", caption.clone(), ["a column"]);
         let text =

@@ -3,7 +3,7 @@ use anyhow::{Context, Result};
 use std::process::ExitCode;
 use std::time::Instant;
 
-/// A run of a benchmark whose answers go into the sections of a page.
+/// A run of a benchmark, whose answers are written into the sections of a page.
 #[derive(Debug)]
 pub struct Bench<'a> {
     name: &'static str,
@@ -16,16 +16,16 @@ impl<'a> Bench<'a> {
     ///
     /// # Errors
     ///
-    /// A page that cannot be read or copied.
+    /// Fails if the page cannot be read or copied.
     pub fn open(name: &'static str, options: &'a Options) -> Result<Self> {
         Ok(Self { name, options, page: options.page(name)? })
     }
 
-    /// Answers a question and says on standard error how long it took.
+    /// Answers a question and prints the duration to standard error.
     ///
     /// # Errors
     ///
-    /// Those of the answer, with the question's name.
+    /// Returns the error of the answer, with the question's name.
     pub fn ask<T>(&self, question: &str, answer: impl FnOnce() -> Result<T>) -> Result<T> {
         eprintln!("{question}");
         let begin = Instant::now();
@@ -34,8 +34,7 @@ impl<'a> Bench<'a> {
         Ok(answer)
     }
 
-    /// Puts an answer into its section. To be called after each question, so that a long run that is stopped leaves
-    /// what it found.
+    /// Writes an answer into its section. Call it after each question, so that an interrupted run keeps its results.
     ///
     /// # Errors
     ///
@@ -45,7 +44,7 @@ impl<'a> Bench<'a> {
     }
 }
 
-/// The exit code of a benchmark: 0, 1 where what must hold does not, 2 after an error, which is printed.
+/// Exit code of a benchmark: 0, 1 if a check fails, 2 after an error, which is printed.
 pub fn exit_code(name: &str, outcome: Result<bool>) -> ExitCode {
     match outcome {
         Ok(true) => ExitCode::SUCCESS,

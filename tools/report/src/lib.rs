@@ -1,7 +1,7 @@
-//! What benchmarks of voxtile have in common: options, clocks, samples, and a page into which tables and plots go.
+//! Common parts of voxtile's benchmarks: options, clocks, samples, and a page for tables and plots.
 //!
 //! ```text
-//! Options -> Bench -> Stopwatch -> Samples -> Table, Plot -> Answer -> a section of the Page, and files beside it
+//! Options -> Bench -> Stopwatch -> Samples -> Table, Plot -> Answer -> a section of the Page, and files next to it
 //! ```
 
 mod answer;
@@ -21,6 +21,6 @@ pub use machine::{description as machine, processor};
 pub use options::{Options, recorded_set};
 pub use page::Page;
 pub use samples::Samples;
-pub use stopwatch::{Stopwatch, Took};
+pub use stopwatch::{Elapsed, Stopwatch};
 pub use table::{Cell, Table};
 pub use work_folder::WorkFolder;

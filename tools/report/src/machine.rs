@@ -1,7 +1,7 @@
 use std::fs;
 use std::thread;
 
-/// The machine, and how busy it was when asked.
+/// The machine and its current load.
 pub fn description() -> String {
     format!("{}, {}", processor(), load())
 }
@@ -15,11 +15,11 @@ pub fn processor() -> String {
     format!("{model}, {cores} core(s)")
 }
 
-/// How many programs wanted a core during the last minute, on Linux.
+/// Load average of the last minute, on Linux.
 fn load() -> String {
     let loads = fs::read_to_string("/proc/loadavg").unwrap_or_default();
     match loads.split_whitespace().next() {
-        Some(load) => format!("load {load} at the end of the run, which alone makes 1 to 2"),
+        Some(load) => format!("load {load} at the end of the run, which itself adds 1 to 2"),
         None => "load unknown".to_owned(),
     }
 }

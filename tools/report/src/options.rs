@@ -2,37 +2,37 @@ use crate::{Page, WorkFolder};
 use anyhow::{Result, anyhow};
 use std::path::{Path, PathBuf};
 
-/// What every benchmark takes on the command line; `tools/bench.sh` fills in the folders.
+/// Options of all benchmarks; `tools/bench.sh` sets the folders.
 #[derive(Debug, clap::Args)]
 pub struct Options {
-    /// Only check that everything works: little data, one run; docs/ stays as it is
+    /// Only check that everything works: little data, one run; leaves docs/ unchanged
     #[arg(long)]
     pub short: bool,
-    /// Only this part; an unknown name lists all
+    /// Only this part; an unknown name lists all parts
     #[arg(long, value_name = "NAME")]
     pub only: Option<String>,
     /// Runs of each measurement; figures are their medians
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     pub runs: Option<u32>,
-    /// Folder for the results [default: where the documents have them; with --short, the benchmark's own below cargo's
-    /// target folder]
+    /// Folder for the results [default: docs/measurements; with --short, a folder of the benchmark below cargo's target
+    /// folder]
     #[arg(long, value_name = "FOLDER")]
     pub out: Option<PathBuf>,
-    /// Folder of the recorded data sets; a set that is absent is skipped
+    /// Folder of the recorded data sets; missing sets are skipped
     #[arg(long, value_name = "FOLDER", default_value = "../shared/data")]
     pub data: PathBuf,
-    /// Cargo's target folder, where maps come and go: the disk that is measured
+    /// Cargo's target folder, also used for temporary maps: its disk is measured
     #[arg(long, value_name = "FOLDER", default_value = "target")]
     pub target: PathBuf,
 }
 
 impl Options {
-    /// How many runs, if the command line does not say: so many, or one of a short benchmark.
+    /// Number of runs: one for a short benchmark, else that of the command line, else `default`.
     pub fn runs_or(&self, default: u32) -> u32 {
         if self.short { 1 } else { self.runs.unwrap_or(default) }
     }
 
-    /// A folder for the maps and streams of a benchmark.
+    /// Creates a folder for the maps and streams of a benchmark.
     ///
     /// # Errors
     ///
@@ -41,7 +41,7 @@ impl Options {
         WorkFolder::create(self.target.join(benchmark).join("work"))
     }
 
-    /// The page `docs/measurements/BENCHMARK.md`, or its copy where the results are to go elsewhere.
+    /// Opens the page `docs/measurements/BENCHMARK.md`, or its copy if the results are written to another folder.
     ///
     /// # Errors
     ///
@@ -53,11 +53,11 @@ impl Options {
         Page::open(&Path::new("docs/measurements").join(name), copy.as_deref())
     }
 
-    /// The parts that are wanted, in their order.
+    /// Returns the selected parts, in order.
     ///
     /// # Errors
     ///
-    /// `--only` with a name that no part has.
+    /// Fails if `--only` names an unknown part.
     pub fn wanted<T>(
         &self,
         parts: impl IntoIterator<Item = T>,
@@ -67,12 +67,12 @@ impl Options {
         let (wanted, others): (Vec<T>, Vec<T>) = parts.into_iter().partition(|part| name(part) == *only);
         if wanted.is_empty() {
             let names: Vec<String> = others.iter().map(name).collect();
-            return Err(anyhow!("--only {only}: there are {}", names.join(", ")));
+            return Err(anyhow!("--only {only}: unknown part; the parts are {}", names.join(", ")));
         }
         Ok(wanted)
     }
 
-    /// What to type to measure a part again.
+    /// The command that measures a part again.
     pub fn command(&self, benchmark: &str, part: Option<&str>) -> String {
         let mut command = format!("tools/bench.sh {benchmark}");
         if self.short {
@@ -84,7 +84,7 @@ impl Options {
     }
 }
 
-/// Folder of a recorded data set in the folder of all. `None`, after saying so, where it is absent.
+/// Folder of a recorded data set; prints a line and returns `None` if it is missing.
 pub fn recorded_set(data: &Path, set: &str) -> Option<PathBuf> {
     let folder = data.join(set);
     let is_there = folder.join("scans").is_dir();
@@ -114,11 +114,14 @@ mod tests {
         let wanted = |line: &str| options(line).wanted(["a", "b"], |part| part.to_string());
         assert_eq!(wanted("it").unwrap(), ["a", "b"]);
         assert_eq!(wanted("it --only b").unwrap(), ["b"]);
-        assert_eq!(wanted("it --only c").unwrap_err().to_string(), "--only c: there are a, b");
+        assert_eq!(
+            wanted("it --only c").unwrap_err().to_string(),
+            "--only c: unknown part; the parts are a, b"
+        );
     }
 
     #[test]
-    fn the_command_repeats_what_decides_the_figures() {
+    fn the_command_has_the_options_that_affect_the_figures() {
         let command = |line: &str| options(line).command("octocache", Some("stages"));
         assert_eq!(command("it --data x"), "tools/bench.sh octocache --only stages");
         assert_eq!(command("it --runs 3"), "tools/bench.sh octocache --runs 3 --only stages");

@@ -4,7 +4,7 @@ use anyhow::{Context, Result, anyhow, ensure};
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// A page in Markdown with sections that are measured, and beside it the folder of their tables and plots.
+/// A page in Markdown with measured sections, and next to it the folder of their tables and plots.
 #[derive(Debug)]
 pub struct Page {
     path: PathBuf,
@@ -12,11 +12,11 @@ pub struct Page {
 }
 
 impl Page {
-    /// The page `source`, or a copy of it at `output`, which then is the one that is written to.
+    /// Opens the page `source`, or a copy of it at `output`, to which results are then written.
     ///
     /// # Errors
     ///
-    /// A page that cannot be read, a copy or a folder that cannot be made.
+    /// Fails if the page cannot be read or the copy or folder cannot be created.
     pub fn open(source: &Path, output: Option<&Path>) -> Result<Self> {
         let path = output.unwrap_or(source).to_owned();
         let folder = path.with_extension("");
@@ -29,23 +29,24 @@ impl Page {
         Ok(page)
     }
 
-    /// The folder of tables and plots.
+    /// Folder of tables and plots.
     pub fn folder(&self) -> &Path {
         &self.folder
     }
 
-    /// Puts an answer into its section, and its files into the folder. `command` is what to type to measure it again.
+    /// Writes an answer into its section, and its files into the folder. `command` is the command that repeats the
+    /// measurement.
     ///
-    /// The page is read anew each time, so that who edits it during a long run loses nothing.
+    /// Reads the page each time, so that edits during a long run are kept.
     ///
     /// # Errors
     ///
-    /// A file that cannot be read or written, a page without the marks of the section.
+    /// Fails if a file cannot be read or written, or if the page lacks the marks of the section.
     pub fn put(&self, section: &str, answer: &Answer, command: &str) -> Result<()> {
         answer.write(&self.folder)?;
         let name = self.folder.file_name().and_then(|name| name.to_str());
-        let name = name
-            .ok_or_else(|| anyhow!("{}: a folder with a readable name is needed", self.folder.display()))?;
+        let name =
+            name.ok_or_else(|| anyhow!("{}: the name of the folder must be UTF-8", self.folder.display()))?;
         let text = answer.markdown(name, command, &machine::description());
         let page = with_section(&read(&self.path)?, section, &text);
         self.write(&page.with_context(|| self.path.display().to_string())?)
@@ -60,7 +61,7 @@ fn read(page: &Path) -> Result<String> {
     fs::read_to_string(page).with_context(|| format!("{}: cannot read the page", page.display()))
 }
 
-/// Puts text into a page, between the marks of a section: what was there before goes, all else stays.
+/// Replaces the text between the marks of a section.
 fn with_section(page: &str, section: &str, text: &str) -> Result<String> {
     let (begin, end) = (format!("<!-- {section}: measured -->\n"), format!("<!-- {section}: end -->\n"));
     for mark in [&begin, &end] {
@@ -89,14 +90,14 @@ mod tests {
     }
 
     #[test]
-    fn marks_that_are_missing_double_or_in_the_wrong_order_are_errors() {
+    fn missing_double_and_swapped_marks_are_errors() {
         assert!(with_section(PAGE, "b", "").is_err());
         assert!(with_section(&PAGE.repeat(2), "a", "").is_err());
         assert!(with_section("<!-- a: end -->\n<!-- a: measured -->\n", "a", "").is_err());
     }
 
     #[test]
-    fn an_answer_goes_into_the_copy_and_the_source_stays() {
+    fn an_answer_is_written_to_the_copy_only() {
         let folder = tempfile::tempdir().unwrap();
         let (source, output) = (folder.path().join("page.md"), folder.path().join("copy.md"));
         fs::write(&source, PAGE).unwrap();

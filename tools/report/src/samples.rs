@@ -1,14 +1,14 @@
-/// Measurements of one thing.
+/// Repeated measurements of a value.
 #[derive(Clone, Debug, Default)]
 pub struct Samples(Vec<f64>);
 
 impl Samples {
-    /// Adds one.
+    /// Adds a sample.
     pub fn push(&mut self, sample: f64) {
         self.0.push(sample);
     }
 
-    /// The middle one, or the mean of the two in the middle; NaN of nothing.
+    /// The middle sample, or the mean of the two middle ones; NaN without samples.
     pub fn median(&self) -> f64 {
         let sorted = self.sorted();
         match sorted.len() {
@@ -17,21 +17,21 @@ impl Samples {
         }
     }
 
-    /// The smallest sample that a share (0 to 1) of them does not exceed; NaN of nothing.
+    /// The smallest sample that a share (0 to 1) of the samples does not exceed; NaN without samples.
     pub fn quantile(&self, share: f64) -> f64 {
         let sorted = self.sorted();
         let rank = (share * sorted.len() as f64).ceil() as usize;
         sorted.get(rank.clamp(1, sorted.len().max(1)) - 1).copied().unwrap_or(f64::NAN)
     }
 
-    /// All of them, ascending.
+    /// All samples, ascending.
     pub fn sorted(&self) -> Vec<f64> {
         let mut sorted = self.0.clone();
         sorted.sort_by(f64::total_cmp);
         sorted
     }
 
-    /// Largest less smallest, as a share of the median: how noisy the measurements were. NaN of fewer than two.
+    /// Largest minus smallest, as a share of the median: the noise of the measurements. NaN for fewer than two.
     pub fn spread(&self) -> f64 {
         match &self.sorted()[..] {
             [least, .., most] => (most - least) / self.median(),
@@ -62,7 +62,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_has_no_median() {
+    fn no_samples_have_no_median() {
         let nothing = Samples::default();
         assert!([nothing.median(), nothing.quantile(0.5), nothing.spread()].iter().all(|x| x.is_nan()));
         assert!(Samples(vec![3.0]).spread().is_nan());

@@ -3,26 +3,26 @@ use rustix::time::{ClockId, clock_gettime};
 use std::ops::Add;
 use std::time::{Duration, Instant};
 
-/// Three clocks: of this thread, of the whole process, and on the wall.
+/// Three clocks: CPU time of this thread, CPU time of the process, and wall time.
 pub struct Stopwatch {
     own: Duration,
     process: Duration,
     wall: Instant,
 }
 
-/// What passed on the clocks, in seconds.
+/// Elapsed time on the clocks, in seconds.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Took {
-    /// CPU time of the thread that asked.
+pub struct Elapsed {
+    /// CPU time of the calling thread.
     pub own_s: f64,
     /// CPU time of the other threads.
     pub others_s: f64,
-    /// Time on the wall.
+    /// Wall time.
     pub wall_s: f64,
 }
 
 impl Stopwatch {
-    /// Starts all three.
+    /// Starts all clocks.
     pub fn start() -> Result<Self> {
         Ok(Self {
             own: cpu_time(ClockId::ThreadCPUTime)?,
@@ -31,23 +31,23 @@ impl Stopwatch {
         })
     }
 
-    /// Reads all three.
-    pub fn stop(&self) -> Result<Took> {
+    /// Reads all clocks.
+    pub fn stop(&self) -> Result<Elapsed> {
         let wall_s = self.wall.elapsed().as_secs_f64();
         let process_s = cpu_time(ClockId::ProcessCPUTime)?.saturating_sub(self.process).as_secs_f64();
         let own_s = cpu_time(ClockId::ThreadCPUTime)?.saturating_sub(self.own).as_secs_f64();
-        Ok(Took { own_s, others_s: (process_s - own_s).max(0.0), wall_s })
+        Ok(Elapsed { own_s, others_s: (process_s - own_s).max(0.0), wall_s })
     }
 }
 
-impl Took {
+impl Elapsed {
     /// CPU time of all threads, in seconds.
     pub fn cpu_s(&self) -> f64 {
         self.own_s + self.others_s
     }
 }
 
-impl Add for Took {
+impl Add for Elapsed {
     type Output = Self;
 
     fn add(self, other: Self) -> Self {
@@ -60,5 +60,5 @@ impl Add for Took {
 }
 
 fn cpu_time(clock: ClockId) -> Result<Duration> {
-    Duration::try_from(clock_gettime(clock)).context("a CPU clock does not tell a length of time")
+    Duration::try_from(clock_gettime(clock)).context("the CPU clock returned an invalid time")
 }

@@ -1,33 +1,33 @@
 use anyhow::{Context, Result};
 use std::path::Path;
 
-/// Numbers in rows: for reading in Markdown, and in full as CSV.
+/// A table: rounded in Markdown, in full precision as CSV.
 pub struct Table {
-    /// Name of the CSV file, without its ending.
+    /// Name of the CSV file, without extension.
     pub file: &'static str,
-    /// What it shows, in one sentence.
+    /// Caption, one sentence.
     pub caption: String,
-    /// Whether it is too long to read, and only its CSV file is linked.
+    /// Whether only the CSV file is linked, as the table is too long.
     pub is_only_csv: bool,
     columns: Vec<String>,
     rows: Vec<Vec<Cell>>,
 }
 
-/// A field of a table.
+/// A cell of a table.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Cell {
-    /// A word.
+    /// Text.
     Text(String),
     /// A whole number.
     Count(u64),
-    /// A measured number, and how many digits after the point are worth reading.
+    /// A measured number, and the number of decimals in Markdown.
     Number(f64, usize),
-    /// A share of 1, read as a percentage.
+    /// A ratio, shown as a percentage in Markdown.
     Share(f64),
 }
 
 impl Table {
-    /// A table without rows.
+    /// Creates a table without rows.
     pub fn new(
         file: &'static str,
         caption: impl Into<String>,
@@ -37,19 +37,19 @@ impl Table {
         Self { file, caption: caption.into(), is_only_csv: false, columns, rows: Vec::new() }
     }
 
-    /// The same, too long to read.
+    /// Returns the table, marked to be linked as CSV only.
     pub fn only_csv(self) -> Self {
         Self { is_only_csv: true, ..self }
     }
 
-    /// Adds a row, a cell a column.
+    /// Adds a row with a cell per column.
     pub fn push(&mut self, row: impl IntoIterator<Item = Cell>) {
         let row: Vec<Cell> = row.into_iter().collect();
         debug_assert_eq!(row.len(), self.columns.len(), "{}", self.file);
         self.rows.push(row);
     }
 
-    /// The table in Markdown, rounded for reading.
+    /// Formats the table in Markdown, rounded.
     pub fn markdown(&self) -> String {
         let line = |cells: Vec<String>| format!("| {} |\n", cells.join(" | "));
         let is_text =
@@ -63,7 +63,7 @@ impl Table {
         text
     }
 
-    /// Writes the table as CSV into a folder, every digit of it.
+    /// Writes the table as CSV into a folder, in full precision.
     pub fn write_csv(&self, folder: &Path) -> Result<()> {
         let path = folder.join(format!("{}.csv", self.file));
         let cannot = || format!("{}: cannot write", path.display());
@@ -92,7 +92,7 @@ impl Cell {
             Self::Text(text) => text.clone(),
             Self::Count(count) => count.to_string(),
             Self::Number(number, _) | Self::Share(number) if !number.is_finite() => String::new(),
-            // Nobody measures more than six digits.
+            // No measurement has more than six significant decimals.
             Self::Number(number, _) | Self::Share(number) => format!("{number:.6}"),
         }
     }
@@ -110,7 +110,7 @@ impl From<u64> for Cell {
     }
 }
 
-/// Digits in threes.
+/// Formats a number with its digits in groups of three.
 fn with_spaces(count: u64) -> String {
     let digits = count.to_string();
     let mut text = String::new();

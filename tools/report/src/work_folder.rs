@@ -6,19 +6,19 @@ use std::path::{Path, PathBuf};
 #[derive(Debug)]
 pub struct WorkFolder(PathBuf);
 
-/// Tells a folder that a run left from one that somebody needs.
+/// Marks a folder of a benchmark, which may be removed.
 const MARKER: &str = ".benchmark";
 
 impl WorkFolder {
-    /// Takes a folder that does not exist yet or that an earlier run left.
+    /// Creates the folder, or empties one of an earlier run.
     ///
     /// # Errors
     ///
-    /// A folder with something else in it, and one that cannot be emptied.
+    /// Fails if the folder has other content or cannot be emptied.
     pub fn create(path: PathBuf) -> Result<Self> {
         ensure!(
             !path.exists() || path.join(MARKER).exists(),
-            "{}: there is something else already; remove it, or name another target folder",
+            "{}: exists and is not of a benchmark; remove it or choose another target folder",
             path.display()
         );
         let folder = Self(path);
@@ -26,11 +26,11 @@ impl WorkFolder {
         Ok(folder)
     }
 
-    /// Removes what is in it.
+    /// Removes the content.
     ///
     /// # Errors
     ///
-    /// A disk that refuses.
+    /// Fails if the content cannot be removed.
     pub fn empty(&self) -> Result<()> {
         let path = &self.0;
         let emptied = || {
@@ -43,7 +43,7 @@ impl WorkFolder {
         emptied().with_context(|| format!("{}: cannot empty the folder", path.display()))
     }
 
-    /// Where it is.
+    /// Path of the folder.
     pub fn path(&self) -> &Path {
         &self.0
     }

@@ -1,9 +1,9 @@
-//! What the tests, benchmarks, examples and tools of voxtile share.
+//! Shared code of the tests, benchmarks, examples and tools of voxtile.
 //!
-//! - what a clever part must equal: [`reference_map`], [`reference_local`];
-//! - what goes wrong: [`faulty_disk`], [`lossy_link`];
-//! - what they work on: [`random_scans`], [`unsynced_disk`], [`memory_folder`];
-//! - where files are, and what errors say: [`support`].
+//! - naive implementations to compare with: [`reference_map`], [`reference_local`]
+//! - faults: [`faulty_disk`], [`lossy_link`]
+//! - inputs and folders: [`random_scans`], [`unsynced_disk`], [`memory_folder`]
+//! - paths and error messages: [`support`]
 
 #[allow(missing_docs)]
 pub mod faulty_disk;
@@ -21,7 +21,7 @@ pub mod support;
 #[allow(missing_docs)]
 pub mod unsynced_disk;
 
-/// The Rust code of the README, which compiles.
+/// Compiles the Rust code of the README.
 #[cfg(doctest)]
 #[doc = include_str!("../../../README.md")]
 mod readme {}

@@ -6,11 +6,11 @@ pub struct LossyLink {
     random: Random,
     pub loss: f64,
     pub repetition: f64,
-    /// Every packet takes between nothing and so long.
+    /// Maximum delay; the delay of a packet is random between 0 and this.
     pub max_delay: Duration,
     pub is_cut: bool,
     in_flight: Vec<(Duration, Vec<u8>)>,
-    /// Bytes that were sent, whether or not they arrive.
+    /// Bytes sent, including those of lost packets.
     pub bytes: u64,
     pub packets: u64,
     pub max_packet: usize,
@@ -46,7 +46,7 @@ impl LossyLink {
         }
     }
 
-    /// What has arrived by now, in the order of arrival.
+    /// Packets that have arrived by now, in the order of arrival.
     pub fn arrived(&mut self, now: Duration) -> Vec<Vec<u8>> {
         let all = std::mem::take(&mut self.in_flight);
         let (mut arrived, rest): (Vec<_>, Vec<_>) = all.into_iter().partition(|(at, _)| *at <= now);

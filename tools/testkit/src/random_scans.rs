@@ -1,7 +1,7 @@
 use voxtile::scan::Scan;
 use voxtile::space::Point;
 
-/// A small seeded generator of numbers (SplitMix64), the same on every platform.
+/// A small seeded random number generator (SplitMix64), with the same numbers on every platform.
 #[derive(Clone)]
 pub struct Random(pub u64);
 
@@ -28,8 +28,7 @@ impl Random {
     }
 }
 
-/// A scan from a sensor that wanders around `center`: mostly good points, some on voxel borders, some that cannot
-/// count.
+/// A scan from a random position around `center`: mostly good points, some on voxel borders, some invalid.
 pub fn random_scan(random: &mut Random, center: Point, points: usize) -> Scan {
     let origin = random.point(center, 2.0);
     let mut scan = Scan { origin, points: Vec::new(), intensities: Some(Vec::new()) };

@@ -5,12 +5,12 @@ use voxtile::scan::RayWalk;
 use voxtile::space::{Grid, Point, VoxelIndex};
 use voxtile_local::{LocalParameters, LocalState, LocalView};
 
-/// The naive local map that the real one must equal: a list for the history, everything else found anew every time.
+/// A naive local map for comparisons: the history is a list, and everything else is computed each time.
 pub struct ReferenceLocal {
     pub grid: Grid,
     pub parameters: LocalParameters,
     pub position: Point,
-    /// Voxels with occupancy and their log-odds, longest without an update first.
+    /// Voxels with occupancy and their log-odds, least recently updated first.
     pub history: Vec<(VoxelIndex, f64)>,
 }
 
@@ -65,7 +65,7 @@ impl ReferenceLocal {
         self.history.drain(..excess);
     }
 
-    /// Clamps all log-odds, and removes what is known to be free.
+    /// Clamps all log-odds, and removes free voxels.
     fn judge_all(&mut self) {
         let p = self.parameters;
         for (_, log_odds) in &mut self.history {
@@ -104,7 +104,7 @@ impl ReferenceLocal {
         self.history.iter().filter(is_occupied).map(|(voxel, _)| *voxel).collect()
     }
 
-    /// The dilation of the occupied voxels in range.
+    /// Dilation of the occupied voxels within the inflation range.
     pub fn inflated(&self) -> BTreeSet<VoxelIndex> {
         let LocalParameters { inflation_range_m, inflation_radius_m, .. } = self.parameters;
         self.dilation(inflation_range_m, inflation_radius_m)
@@ -130,7 +130,7 @@ impl ReferenceLocal {
         inflated
     }
 
-    /// What readers should see.
+    /// Expected states of a view.
     pub fn states(&self) -> BTreeMap<VoxelIndex, LocalState> {
         let inflated = self.inflated().into_iter().map(|voxel| (voxel, LocalState::Inflated));
         let occupied = self.occupied().into_iter().map(|voxel| (voxel, LocalState::Occupied));
@@ -138,9 +138,9 @@ impl ReferenceLocal {
     }
 }
 
-/// What readers see.
+/// States of a view.
 pub fn states_of(view: &LocalView) -> BTreeMap<VoxelIndex, LocalState> {
     let mut states = BTreeMap::new();
-    view.for_each(|voxel, state| assert_eq!(states.insert(voxel, state), None, "{voxel:?} comes twice"));
+    view.for_each(|voxel, state| assert_eq!(states.insert(voxel, state), None, "{voxel:?} occurs twice"));
     states
 }

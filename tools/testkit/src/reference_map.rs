@@ -8,7 +8,7 @@ use voxtile::{InsertMode, MapConfig};
 /// Log-odds bits and observation count of every observed voxel.
 pub type Voxels = BTreeMap<VoxelIndex, (u64, i32)>;
 
-/// The naive mapper that every clever part must equal: a `BTreeMap`, one step at a time, nothing shared.
+/// A naive mapper for comparisons: a `BTreeMap`, updated step by step.
 pub struct ReferenceMap {
     pub config: MapConfig,
     pub voxels: Voxels,
@@ -62,7 +62,7 @@ impl ReferenceMap {
         self.updated.push(voxel);
     }
 
-    /// The voxels that a ray passes, and the one it hits.
+    /// The voxels that a ray passes, and the one that it hits.
     fn ray(
         &self,
         origin: Point,
@@ -106,13 +106,13 @@ impl ReferenceMap {
     }
 }
 
-/// Everything a map holds.
+/// All voxels of a map.
 pub fn voxels_of(view: &impl MapView) -> Voxels {
     let mut voxels = Voxels::new();
     for tile in view.tiles() {
         for voxel in tile.expect("a readable tile").voxels() {
             let evidence = (voxel.evidence.log_odds.to_bits(), voxel.evidence.observation_count);
-            assert_eq!(voxels.insert(voxel.index, evidence), None, "{:?} has two homes", voxel.index);
+            assert_eq!(voxels.insert(voxel.index, evidence), None, "{:?} occurs twice", voxel.index);
         }
     }
     voxels

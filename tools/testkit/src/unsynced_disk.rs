@@ -5,16 +5,16 @@ use std::thread;
 use std::time::Duration;
 use voxtile::store::{Disk, DiskLock, DiskRead, DiskWrite, EntryKind, FsDisk, ReaderWatch, Scratch};
 
-/// The file system without waiting for the medium: for tests that are not about crashes.
+/// The file system without syncs, for tests that do not simulate crashes.
 #[derive(Debug)]
 pub struct UnsyncedDisk {
-    /// What a sync takes in place of what the medium takes.
+    /// Simulated duration of a sync.
     sync_time: Duration,
-    /// How long it takes to begin a file on the thread that writes beside the mapping.
-    beside_time: Duration,
-    /// How long it takes to open a file for reading on the thread of a name.
+    /// Delay of each new file on the background saving thread.
+    background_time: Duration,
+    /// Delay of each opened file on the thread of this name.
     read_time: Option<(&'static str, Duration)>,
-    /// While somebody holds it, the thread that flushes beside the mapper begins no file.
+    /// While this is locked, the background flush thread creates no file.
     gate: Arc<Mutex<()>>,
 }
 
@@ -24,28 +24,28 @@ impl UnsyncedDisk {
     }
 
     fn new() -> Self {
-        let (sync_time, beside_time) = (Duration::ZERO, Duration::ZERO);
-        Self { sync_time, beside_time, read_time: None, gate: Arc::default() }
+        let (sync_time, background_time) = (Duration::ZERO, Duration::ZERO);
+        Self { sync_time, background_time, read_time: None, gate: Arc::default() }
     }
 
-    /// A medium that takes so long for a sync, 16 of them at once, whatever has been written.
-    pub fn taking(sync_time: Duration) -> Arc<dyn Disk> {
+    /// A disk whose syncs take this time, 16 at once, independent of the bytes written.
+    pub fn with_sync_time(sync_time: Duration) -> Arc<dyn Disk> {
         Arc::new(Self { sync_time, ..Self::new() })
     }
 
-    /// A disk that is slow for the thread that writes beside the mapping, so that the other thread gets ahead.
+    /// A disk that is slow for the background saving thread, so that the mapping thread gets ahead.
     #[allow(dead_code, reason = "benches share this file")]
-    pub fn slow_beside(beside_time: Duration) -> Arc<dyn Disk> {
-        Arc::new(Self { beside_time, ..Self::new() })
+    pub fn slow_in_background(background_time: Duration) -> Arc<dyn Disk> {
+        Arc::new(Self { background_time, ..Self::new() })
     }
 
-    /// A disk from which the thread of a name reads slowly.
+    /// A disk that is slow to open files for reading on the thread of this name.
     #[allow(dead_code, reason = "benches share this file")]
     pub fn slow_to_read_for(thread: &'static str, read_time: Duration) -> Arc<dyn Disk> {
         Arc::new(Self { read_time: Some((thread, read_time)), ..Self::new() })
     }
 
-    /// A disk on which the thread that flushes beside the mapper begins no file while somebody holds this.
+    /// A disk on which the background flush thread creates no file while `gate` is locked.
     #[allow(dead_code, reason = "benches share this file")]
     pub fn gated(gate: &Arc<Mutex<()>>) -> Arc<dyn Disk> {
         Arc::new(Self { gate: gate.clone(), ..Self::new() })
@@ -97,7 +97,7 @@ impl Disk for UnsyncedDisk {
 
     fn create(&self, path: &Path) -> io::Result<Box<dyn DiskWrite>> {
         match thread::current().name() {
-            Some("voxtile-save") => wait(self.beside_time),
+            Some("voxtile-save") => wait(self.background_time),
             Some("voxtile-flush") => drop(self.gate.lock().unwrap_or_else(PoisonError::into_inner)),
             _ => {}
         }

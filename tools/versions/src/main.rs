@@ -1,5 +1,4 @@
-//! The benchmark `versions`: voxtile beside an earlier version of itself, on the same scans. `tools/bench.sh` builds
-//! both.
+//! The benchmark `versions`: compares voxtile with an earlier version on the same scans. `tools/bench.sh` builds both.
 
 mod cpu_time;
 mod outcome;
@@ -29,7 +28,7 @@ struct Arguments {
     /// Folder of the earlier version's programs
     #[arg(long, value_name = "FOLDER")]
     before: PathBuf,
-    /// Folder of the present version's programs
+    /// Folder of the current version's programs
     #[arg(long, value_name = "FOLDER")]
     now: PathBuf,
 }

@@ -1,19 +1,19 @@
-/// What one measurement of both came to: medians.
+/// Medians of one measurement for both versions.
 #[derive(Clone, Copy)]
 pub struct Pair {
-    /// Of the earlier version.
+    /// The earlier version.
     pub before: f64,
-    /// Of the present one.
+    /// The current version.
     pub now: f64,
 }
 
 impl Pair {
-    /// How many times less the present version takes.
+    /// Speed of the current version relative to the earlier one.
     pub fn ratio(&self) -> f64 {
         self.before / self.now
     }
 
-    /// Both and their ratio, for reading.
+    /// Formats both values and their ratio.
     pub fn text(&self, digits: usize) -> String {
         format!("{:.digits$} -> {:.digits$} ({:.2}x)", self.before, self.now, self.ratio())
     }

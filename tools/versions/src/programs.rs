@@ -8,20 +8,24 @@ pub struct Programs {
 }
 
 impl Programs {
-    /// The programs in a folder.
+    /// Finds the programs in a folder.
     ///
     /// # Errors
     ///
-    /// A program that is missing.
+    /// Fails if a program is missing.
     pub fn in_folder(folder: &Path) -> Result<Self> {
         for name in ["voxtile", "voxtile_contender", "questions"] {
             let program = folder.join(name);
-            ensure!(program.is_file(), "{}: missing; tools/bench.sh versions builds it", program.display());
+            ensure!(
+                program.is_file(),
+                "{}: missing; build it with tools/bench.sh versions",
+                program.display()
+            );
         }
         Ok(Self { folder: folder.to_owned() })
     }
 
-    /// A program of this version with its arguments, on so many threads.
+    /// A command for a program of this version, with a number of threads.
     pub fn command(&self, name: &str, threads: usize) -> Command {
         let mut command = Command::new(self.folder.join(name));
         command.env("RAYON_NUM_THREADS", threads.to_string());

@@ -7,28 +7,28 @@ use voxtile::Scan;
 use voxtile_formats::{ReadOptions, open_scans};
 use workload::{ScanWriter, SurveyName};
 
-/// Scans that are mapped, and how finely.
+/// A set of scans and the resolution of its map.
 pub struct ScanSet {
-    /// What the tables call it.
+    /// Name in tables.
     pub name: &'static str,
     /// Edge of a voxel in metres.
     pub resolution_m: f64,
-    /// How many scans.
+    /// Number of scans.
     pub scans: usize,
-    /// How many where every ray counts.
+    /// Number of scans for per-ray updates.
     pub ray_scans: usize,
-    /// The survey, where it is made up.
+    /// The survey of a synthetic set.
     survey: Option<SurveyName>,
 }
 
-/// Cuts rays, in metres.
+/// Maximum range, in metres.
 pub const MAX_RANGE_M: f64 = 60.0;
 const SEED: u64 = 1;
 
 /// The recorded sets.
 pub const RECORDED: [&str; 3] = ["balm_os0_hall", "fastlio_hku_1", "mulran_riverside02_a"];
 
-/// The eight sets; fewer scans of fewer sets if `is_short`.
+/// The eight sets; fewer sets with fewer scans if `is_short`.
 pub fn all(is_short: bool) -> Vec<ScanSet> {
     let set = |name, resolution_m, scans, ray_scans, survey| ScanSet {
         name,
@@ -54,16 +54,16 @@ pub fn all(is_short: bool) -> Vec<ScanSet> {
 }
 
 impl ScanSet {
-    /// The name for tables, with the resolution.
+    /// Name in tables, with the resolution.
     pub fn title(&self) -> String {
         format!("{}, {} m", self.name, self.resolution_m)
     }
 
-    /// The scans; `None`, after saying so, where a recorded set is absent.
+    /// Reads or generates the scans; prints a line and returns `None` if a recorded set is missing.
     ///
     /// # Errors
     ///
-    /// Scans that cannot be read.
+    /// Fails if the scans cannot be read.
     pub fn read(&self, data: &Path) -> Result<Option<Vec<Scan>>> {
         if let Some(survey) = self.survey {
             return Ok(Some(survey.scans(SEED, 0, SurveyName::RAYS).take(self.scans).collect()));
@@ -80,12 +80,11 @@ impl ScanSet {
         Ok(Some(scans))
     }
 
-    /// Writes the scans as a stream for the contender and returns where, and how many rays they have; `None` where a
-    /// recorded set is absent.
+    /// Writes the scans as a stream for the contender; returns `None` if a recorded set is missing.
     ///
     /// # Errors
     ///
-    /// Scans that cannot be read, a stream that cannot be written.
+    /// Fails if the scans cannot be read or the stream cannot be written.
     pub fn write(&self, data: &Path, folder: &Path) -> Result<Option<Stream>> {
         let Some(scans) = self.read(data)? else { return Ok(None) };
         let path = folder.join(format!("{}_{}", self.name, self.resolution_m));
@@ -95,7 +94,9 @@ impl ScanSet {
             scans.iter().try_for_each(|scan| writer.write(scan))?;
             writer.flush()
         });
-        written.with_context(|| format!("{}: cannot write the scans; is there room?", path.display()))?;
+        written.with_context(|| {
+            format!("{}: cannot write the scans; check the free disk space", path.display())
+        })?;
         let first = &scans[..self.ray_scans.min(scans.len())];
         Ok(Some(Stream { path, scans: scans.len(), rays: rays(&scans), first_rays: rays(first) }))
     }
@@ -103,12 +104,12 @@ impl ScanSet {
 
 /// A stream of scans for the contender.
 pub struct Stream {
-    /// Its file.
+    /// Path of the file.
     pub path: PathBuf,
-    /// Its scans.
+    /// Number of scans.
     pub scans: usize,
-    /// Their rays.
+    /// Number of rays.
     pub rays: usize,
-    /// The rays of the first scans, where every one counts.
+    /// Number of rays of the first scans, which are used for per-ray updates.
     pub first_rays: usize,
 }

@@ -1,7 +1,7 @@
 use crate::versions::Versions;
 use std::path::PathBuf;
 
-/// What all questions are put to.
+/// Inputs of all questions.
 pub struct Setting {
     /// Both versions.
     pub versions: Versions,
@@ -9,6 +9,6 @@ pub struct Setting {
     pub data: PathBuf,
     /// An empty folder for streams and maps.
     pub work: PathBuf,
-    /// Whether it is only to be seen that everything works.
+    /// Whether to check only that everything works.
     pub is_short: bool,
 }

@@ -3,22 +3,23 @@ use crate::programs::Programs;
 use anyhow::Result;
 use report::Samples;
 
-/// Two versions that are compared.
+/// The versions to compare.
 pub struct Versions {
-    /// The earlier one.
+    /// The earlier version.
     pub before: Programs,
-    /// The present one.
+    /// The current version.
     pub now: Programs,
-    /// How often each measurement is taken, the two in turn.
+    /// Number of runs of each measurement, alternating between the versions.
     pub runs: usize,
 }
 
 impl Versions {
-    /// Measures both in turn; medians of several figures. A measurement that names no figure counts as NaN.
+    /// Runs the measurement with both versions in turn, and returns the medians. NaN marks a figure that a version
+    /// lacks.
     ///
     /// # Errors
     ///
-    /// Those of a measurement.
+    /// Returns the error of a measurement.
     pub fn measure<const N: usize>(
         &self,
         measure: impl Fn(&Programs) -> Result<[f64; N]>,

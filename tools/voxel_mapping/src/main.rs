@@ -1,4 +1,4 @@
-//! The tables of the voxel mapping paper: local maps, and robots that plan by them.
+//! The tables of the voxel mapping paper: local maps, and robots that plan with them.
 
 mod high_speed;
 mod planner;
@@ -22,9 +22,9 @@ struct Arguments {
 enum Table {
     /// Table I: time and memory of a local map with the setups a to e
     Setups(SetupArgs),
-    /// Table II: travellers without sensors fly by the maps of two spotters
+    /// Table II: travellers without sensors fly with the maps of two spotters
     Sensorless(FlightArgs),
-    /// Table III: fast flights by a local map and by a window around the robot
+    /// Table III: fast flights with a local map and with a window around the robot
     HighSpeed(FlightArgs),
 }
 
@@ -33,10 +33,10 @@ struct SetupArgs {
     /// Scans, as `voxtile local` reads them
     #[arg(value_name = "SCANS")]
     scans: PathBuf,
-    /// Take about so many points of each scan, evenly [default: all]
+    /// Use about N points of each scan, evenly chosen [default: all]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     points: Option<u32>,
-    /// Run the scans so many times, and count for each update the least of its times
+    /// Run the scans N times, and use the shortest time of each update
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..))]
     repeat: u32,
 }

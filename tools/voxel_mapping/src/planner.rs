@@ -4,28 +4,28 @@ use voxtile::space::Point;
 use voxtile::{Queries, UnknownAs};
 use voxtile_local::{LocalState, LocalView, Obstacle};
 
-/// Between the nodes of the search.
+/// Distance between the nodes of the search.
 const STEP_M: f64 = 0.4;
-/// Nodes that a search looks at before it gives up.
+/// Maximum number of nodes of a search.
 const MAX_NODES: usize = 60_000;
-/// Heights between which is flown.
+/// Minimum and maximum flight height.
 const HEIGHTS_M: [f64; 2] = [1.0, 4.0];
 
-/// A node of the search, in steps from its beginning.
+/// A node of the search, in steps from the start.
 type Node = [i32; 3];
 
-/// A plain A* search over a grid of 26 neighbors, among voxels that are not inflated; what is unknown is free. The path
-/// is then drawn tight. `None` if there is no way.
+/// Plans with A* on a grid of 26 neighbors, among voxels that are not inflated; unknown voxels are free. Shortcuts then
+/// straighten the path. Returns `None` if there is no path.
 pub fn plan(view: &LocalView, from: Point, to: Point) -> Option<Vec<Point>> {
     let point = |node: Node| std::array::from_fn(|k| from[k] + f64::from(node[k]) * STEP_M);
-    // In whole hundredths of a step, so that nodes can be ordered.
+    // In hundredths of a step, as integers, so that nodes can be ordered.
     let ahead = |node: Node| (distance_m(point(node), to) / STEP_M * 100.0) as u32;
     let mut open = BinaryHeap::from([(Reverse(ahead([0; 3])), [0; 3])]);
     let mut best: HashMap<Node, (u32, Node)> = HashMap::from([([0; 3], (0, [0; 3]))]);
     let mut closed = std::collections::HashSet::new();
     while let Some((_, node)) = open.pop() {
         if distance_m(point(node), to) <= STEP_M {
-            return Some(tightened(view, way_to(&best, node).into_iter().map(point).collect()));
+            return Some(tightened(view, path_to(&best, node).into_iter().map(point).collect()));
         }
         if !closed.insert(node) {
             continue;
@@ -42,7 +42,7 @@ pub fn plan(view: &LocalView, from: Point, to: Point) -> Option<Vec<Point>> {
             }
             let length = f64::from(step.iter().map(|k| k * k).sum::<i32>()).sqrt();
             let cost = cost + (length * 100.0) as u32;
-            // Out of an inflated voxel any step leads; otherwise none through one.
+            // The start may be in an inflated voxel; other steps must be free.
             let is_known = best.get(&next).is_some_and(|(known, _)| *known <= cost);
             if !is_known && (node == [0; 3] || is_free(view, point(node), at)) {
                 best.insert(next, (cost, node));
@@ -57,17 +57,17 @@ fn neighbors() -> impl Iterator<Item = Node> {
     (0..27).map(|k| [k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1]).filter(|step| *step != [0; 3])
 }
 
-fn way_to(best: &HashMap<Node, (u32, Node)>, mut node: Node) -> Vec<Node> {
-    let mut way = vec![node];
+fn path_to(best: &HashMap<Node, (u32, Node)>, mut node: Node) -> Vec<Node> {
+    let mut path = vec![node];
     while node != [0; 3] {
         node = best[&node].1;
-        way.push(node);
+        path.push(node);
     }
-    way.reverse();
-    way
+    path.reverse();
+    path
 }
 
-/// The path without the corners that can be cut.
+/// Removes corners that can be cut.
 fn tightened(view: &LocalView, path: Vec<Point>) -> Vec<Point> {
     let mut tight = vec![path[0]];
     let mut at = 0;
@@ -79,10 +79,10 @@ fn tightened(view: &LocalView, path: Vec<Point>) -> Vec<Point> {
     tight
 }
 
-/// Whether a straight line meets no inflated voxel.
+/// Returns whether a segment crosses no inflated voxel.
 pub fn is_free(view: &LocalView, from: Point, to: Point) -> bool {
-    let way = view.obstacles(Obstacle::Inflated).cast_segment(from, to, UnknownAs::Free);
-    matches!(way, Ok(None))
+    let path = view.obstacles(Obstacle::Inflated).cast_segment(from, to, UnknownAs::Free);
+    matches!(path, Ok(None))
 }
 
 pub fn distance_m(a: Point, b: Point) -> f64 {

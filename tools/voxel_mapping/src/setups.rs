@@ -1,4 +1,4 @@
-//! The paper's table I: updates of a local map with five setups.
+//! Table I of the paper: updates of a local map with five setups.
 
 use anyhow::Result;
 use report::{Cell, Samples, Stopwatch, Table};
@@ -10,10 +10,10 @@ use voxtile_local::{LocalMap, LocalParameters, LocalReader, LocalState};
 
 /// Edge of a voxel.
 const RESOLUTION_M: f64 = 0.1;
-/// Counting memory looks at all of it, so it is done after so many scans.
+/// Interval of memory counts, in scans: a count visits the whole map.
 const COUNT_EVERY: usize = 16;
 
-/// Name, input range and inflation range in metres, and the limit of voxels.
+/// Name, input range and inflation range in metres, and maximum number of voxels.
 type Setup = (&'static str, f64, f64, Option<usize>);
 
 const SETUPS: [Setup; 5] = [
@@ -23,10 +23,10 @@ const SETUPS: [Setup; 5] = [
     (RELAYED, f64::INFINITY, f64::INFINITY, Some(50_000)),
     ("e", 10.0, 8.0, Some(50_000)),
 ];
-/// The setup whose map takes what another map newly finds occupied.
+/// The setup whose map receives the newly occupied voxels of another map.
 const RELAYED: &str = "d";
 
-/// Runs the scans through a map of each setup, `repeat` times, and prints the table.
+/// Runs the scans with a map of each setup, `repeat` times, and prints the table.
 pub fn run(scans: &Path, points: Option<u32>, repeat: u32) -> Result<()> {
     let columns = ["setup", "n_occ", "n_inf", "t_cpu (ms)", "p99 (ms)", "MB", "B/voxel"];
     let mut table = Table::new("setups", "Updates of the local map.", columns);
@@ -42,16 +42,16 @@ pub fn run(scans: &Path, points: Option<u32>, repeat: u32) -> Result<()> {
     Ok(())
 }
 
-/// What the scans came to with one setup.
+/// Result of one setup.
 #[derive(Default)]
 struct Outcome {
     /// CPU time of each update.
     cpu_ms: Vec<f64>,
     /// Voxels with occupancy at the end.
     occupied: usize,
-    /// Inflated voxels, the sum over all updates.
+    /// Sum of the inflated voxels over all updates.
     inflated: usize,
-    /// The most memory.
+    /// Maximum memory, in bytes.
     bytes: usize,
     bytes_per_voxel: f64,
 }
@@ -98,7 +98,7 @@ fn run_setup(scans: &Path, points: Option<u32>, (name, d_in, d_inf, n_lim): Setu
     Ok(outcome)
 }
 
-/// The next scan, in the world frame, with about so many points.
+/// The next scan, in the world frame, with at most `points` points.
 fn next_scan(source: &mut dyn ScanSource, points: Option<u32>) -> Result<Option<Scan>> {
     let Some(scan) = source.next_scan()? else { return Ok(None) };
     let mut scan = scan.into_scan();
@@ -110,7 +110,7 @@ fn next_scan(source: &mut dyn ScanSource, points: Option<u32>) -> Result<Option<
     Ok(Some(scan))
 }
 
-/// Another robot's map, which sends what it newly finds occupied.
+/// A map of another robot that sends its newly occupied voxels.
 struct Relay {
     map: LocalMap,
     reader: LocalReader,
@@ -123,7 +123,7 @@ impl Relay {
         Ok(Self { reader: map.reader(), grid: Grid::new(RESOLUTION_M, 64.0 * RESOLUTION_M)?, map })
     }
 
-    /// The centers of the voxels that a scan newly made occupied, in metres.
+    /// Centers of the voxels that became occupied with a scan, in metres.
     fn points(&mut self, scan: &Scan) -> Result<Vec<Point>> {
         self.map.insert_scan(scan)?;
         let (_, changes) = self.reader.changes();
@@ -137,7 +137,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_relay_sends_every_voxel_that_becomes_occupied_and_sends_it_once() {
+    fn a_relay_sends_each_newly_occupied_voxel_once() {
         let mut relay = Relay::new(LocalParameters::local_mapping()).unwrap();
         let points: Vec<Point> = (0..40).map(|k| [2.05, 0.1 * f64::from(k) + 0.05, 0.05]).collect();
         let scan = Scan { origin: [0.05; 3], points: points.clone(), intensities: None };

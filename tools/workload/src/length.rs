@@ -1,6 +1,6 @@
 use std::str::FromStr;
 
-/// A length as it is typed: `5km`, `800m`, `800`.
+/// A length as text: `5km`, `800m`, `800` (metres).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Length {
     /// In metres; positive and finite.

@@ -1,7 +1,7 @@
-//! The scans of the made-up surveys, and the plain stream of bytes in which tools hand scans to other mappers.
+//! The scans of the synthetic surveys, and the plain stream of scans for other mappers.
 //!
 //! Per scan, little-endian: count `u32`, origin 3 x `f32`, points 3 x `f32` each, in metres in the world frame. The
-//! intensities, one `f32` a point, are a stream of their own beside it, so that who needs none reads none.
+//! intensities are a separate stream with one `f32` per point, so that readers can skip them.
 
 mod length;
 mod stream;

@@ -1,4 +1,4 @@
-//! The command `workload`: scans of a made-up survey to a file or to a pipe.
+//! The command `workload`: writes scans of a synthetic survey to a file or pipe.
 
 use anyhow::{Context, Result, bail};
 use clap::Parser;
@@ -10,40 +10,40 @@ use voxtile::Scan;
 use voxtile_formats::ScanStreamWriter;
 use workload::{Length, ScanWriter, SurveyName};
 
-/// Writes the scans of a made-up survey, as a scan stream that `voxtile build` reads.
+/// Writes the scans of a synthetic survey, as a scan stream that `voxtile build` reads.
 ///
-/// Nothing is kept: a survey of any length takes the memory of a scan. The same arguments give the same bytes on every
+/// Memory holds one scan at a time, whatever the length of the survey. The same arguments give the same bytes on every
 /// platform.
 ///
 ///     workload drive --length 5km | voxtile build - -o MAP
 #[derive(Debug, Parser)]
 #[command(name = "workload", version, verbatim_doc_comment)]
 struct Arguments {
-    /// Which survey
+    /// Survey to generate
     survey: SurveyName,
-    /// How many scans to write
+    /// Number of scans to write
     #[arg(long, value_name = "N", required_unless_present = "length")]
     scans: Option<usize>,
-    /// How far to go, in km or m (5km, 800m)
+    /// Length of the trajectory, in km or m (5km, 800m)
     #[arg(long, value_name = "LENGTH", conflicts_with = "scans")]
     length: Option<Length>,
-    /// Rays of a scan, more or less; street and indoor have their own number
+    /// Approximate number of rays of a scan; fixed for street and indoor
     #[arg(long, value_name = "N", default_value_t = SurveyName::RAYS)]
     rays: u32,
     /// Number of the first scan, counted from 0
     #[arg(long, value_name = "K", default_value_t = 0)]
     first: usize,
-    /// Seed of the world, the way through it and the noise
+    /// Seed of the world, the trajectory and the noise
     #[arg(long, value_name = "S", default_value_t = 1)]
     seed: u64,
-    /// File of the stream [default: standard output]
+    /// Output file [default: standard output]
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
-    /// Write the plain stream of world points for other mappers instead: per scan, little-endian, count u32, origin
-    /// 3 x f32, points 3 x f32 each, in metres
+    /// Write the plain stream of world points for other mappers instead: per scan, little-endian, count u32, origin 3 x
+    /// f32, points 3 x f32 each, in metres
     #[arg(long)]
     plain: bool,
-    /// Beside the plain stream, write the intensities (0 to 255) to this file: one f32 a point, little-endian
+    /// Also write the intensities (0 to 255) to this file: one f32 per point, little-endian
     #[arg(long, value_name = "FILE", requires = "plain")]
     intensities: Option<PathBuf>,
 }
@@ -79,7 +79,7 @@ fn scan_count(arguments: &Arguments) -> Result<usize> {
     match (arguments.scans, arguments.length, arguments.survey.spacing_m()) {
         (Some(scans), ..) => Ok(scans),
         (None, Some(length), Some(spacing_m)) => Ok((length.metres / spacing_m).ceil() as usize),
-        _ => bail!("--length: there is no way between the scans of this survey; say how many with --scans"),
+        _ => bail!("--length: the scans of this survey have no spacing; use --scans"),
     }
 }
 
@@ -107,7 +107,7 @@ fn created(path: &Path) -> Result<File> {
     File::create(path).with_context(|| format!("{}: cannot create the file", path.display()))
 }
 
-/// `workload ... | head` is no error.
+/// Closing the pipe, as in `workload ... | head`, is not an error.
 fn is_closed_pipe(error: &anyhow::Error) -> bool {
     let cause = error.root_cause().downcast_ref::<io::Error>();
     cause.is_some_and(|cause| cause.kind() == io::ErrorKind::BrokenPipe)

@@ -2,34 +2,35 @@ use std::io::{self, BufRead, Read, Write};
 use voxtile::Scan;
 use voxtile::space::Point;
 
-/// Writes scans to a stream, rounded to `f32`, and their intensities to another where one is given.
+/// Writes scans to a stream, rounded to `f32`, and optionally their intensities to another.
 #[derive(Debug)]
 pub struct ScanWriter<W> {
     scans: W,
     intensities: Option<W>,
 }
 
-/// Reads what a [`ScanWriter`] wrote, as an iterator over scans.
+/// Iterator over the scans that a [`ScanWriter`] wrote.
 #[derive(Debug)]
 pub struct ScanReader<R> {
     scans: R,
     intensities: Option<R>,
 }
 
-/// Room made at once for the points of a scan: the count in a damaged stream may be any.
+/// Maximum number of points to reserve memory for: the count may be wrong in a damaged stream.
 const MAX_RESERVED: usize = 1 << 20;
 
 impl<W: Write> ScanWriter<W> {
-    /// A writer to the stream of scans and, if wanted, that of intensities.
+    /// Creates a writer of scans and, optionally, intensities.
     pub fn new(scans: W, intensities: Option<W>) -> Self {
         Self { scans, intensities }
     }
 
-    /// Adds a scan.
+    /// Writes a scan.
     ///
     /// # Errors
     ///
-    /// More points than a `u32` counts, not one intensity a point where intensities are wanted, a stream that refuses.
+    /// Fails if the scan has more points than a `u32` counts, if an intensity per point is needed and missing, or if a
+    /// stream cannot be written.
     pub fn write(&mut self, scan: &Scan) -> io::Result<()> {
         let count =
             u32::try_from(scan.points.len()).map_err(|_| invalid("a scan of more than 2^32 - 1 points"))?;
@@ -42,15 +43,15 @@ impl<W: Write> ScanWriter<W> {
             Some(intensities) if intensities.len() == scan.points.len() => {
                 intensities.iter().try_for_each(|intensity| out.write_all(&intensity.to_le_bytes()))
             }
-            _ => Err(invalid("the scan has not one intensity a point")),
+            _ => Err(invalid("the scan needs one intensity per point")),
         }
     }
 
-    /// Hands everything on to what the streams lead to.
+    /// Flushes the streams.
     ///
     /// # Errors
     ///
-    /// A stream that refuses.
+    /// Fails if a stream cannot be written.
     pub fn flush(&mut self) -> io::Result<()> {
         self.scans.flush()?;
         self.intensities.as_mut().map_or(Ok(()), Write::flush)
@@ -58,7 +59,7 @@ impl<W: Write> ScanWriter<W> {
 }
 
 impl<R: BufRead> ScanReader<R> {
-    /// A reader of the stream of scans and, if there is one, that of intensities.
+    /// Creates a reader of scans and, optionally, intensities.
     pub fn new(scans: R, intensities: Option<R>) -> Self {
         Self { scans, intensities }
     }
@@ -67,7 +68,7 @@ impl<R: BufRead> ScanReader<R> {
         if self.scans.fill_buf()?.is_empty() {
             return Ok(None);
         }
-        let ends = |error| whole(error, "the stream of scans ends within a scan; write it anew");
+        let ends = |error| whole(error, "the stream of scans ends within a scan; write it again");
         let mut count = [0; 4];
         self.scans.read_exact(&mut count).map_err(ends)?;
         let count = u32::from_le_bytes(count) as usize;
@@ -94,7 +95,7 @@ impl<R: BufRead> Iterator for ScanReader<R> {
     }
 }
 
-/// Three `f32`, widened.
+/// Reads three `f32` as `f64`.
 fn read_point(input: &mut impl Read) -> io::Result<Point> {
     Ok([f64::from(read_f32(input)?), f64::from(read_f32(input)?), f64::from(read_f32(input)?)])
 }
@@ -105,7 +106,7 @@ fn read_f32(input: &mut impl Read) -> io::Result<f32> {
     Ok(f32::from_le_bytes(bytes))
 }
 
-/// The error, or what the end of a stream in the middle of something means.
+/// Replaces an unexpected end of the stream by an error with this meaning.
 fn whole(error: io::Error, meaning: &'static str) -> io::Error {
     if error.kind() == io::ErrorKind::UnexpectedEof { io::Error::new(error.kind(), meaning) } else { error }
 }
@@ -136,7 +137,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_written_is_read_rounded_to_f32() {
+    fn written_scans_are_read_back_rounded_to_f32() {
         let scans: Vec<Scan> = SurveyName::Indoor.scans(3, 5, SurveyName::RAYS).take(2).collect();
         let [points, intensities] = written(&scans);
         let read: io::Result<Vec<Scan>> = ScanReader::new(&points[..], Some(&intensities[..])).collect();
@@ -162,7 +163,7 @@ mod tests {
     }
 
     #[test]
-    fn a_scan_without_intensities_is_refused_where_they_are_wanted() {
+    fn a_scan_without_required_intensities_is_refused() {
         let scan = Scan { points: vec![[1.0; 3]], ..Scan::default() };
         assert!(ScanWriter::new(Vec::new(), Some(Vec::new())).write(&scan).is_err());
         ScanWriter::new(Vec::new(), None).write(&scan).unwrap();

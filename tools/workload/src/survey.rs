@@ -3,36 +3,36 @@ use serde::{Deserialize, Serialize};
 use voxtile::Scan;
 use voxtile_simulation::Survey;
 
-/// Which of the made-up surveys.
+/// A synthetic survey.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Serialize, Deserialize)]
 pub enum SurveyName {
     /// 64 beams of 1024 rays, every metre of a drive through a city; mean range 12 m, at most 60 m
     Street,
     /// 90 000 rays, every half metre of a walk through a building; mean range 2.3 m, at most 20 m
     Indoor,
-    /// Every metre of a drive through an endless city: mostly new streets, a fifth of them driven again
+    /// Every metre of a drive through an endless city: mostly new streets; a fifth are revisited
     Drive,
-    /// Every metre of the same round of 4 km through the city, again and again
+    /// Every metre of a loop of 4 km through the city, repeated
     Laps,
-    /// Every ten centimetres of a round of 2.4 km through a warehouse, again and again: ten scans a second
+    /// Every ten centimetres of a loop of 2.4 km through a warehouse, repeated: ten scans per second
     Warehouse,
-    /// Every scan from another street within 5 km
+    /// Each scan in a random street within 5 km
     Teleport,
-    /// Every scan from another mast of 50 m within 5 km, with rays of up to 400 m
+    /// Each scan on a random mast of 50 m height within 5 km, with rays of up to 400 m
     Mast,
 }
 
 /// Streets along each side of a lap: 4 x 17 x 60 m.
 const LAP_BLOCKS: u64 = 17;
-/// How far from the origin teleports and masts are, in metres.
+/// Maximum distance of teleports and masts from the origin, in metres.
 const REACH_M: f64 = 5_000.0;
 
 impl SurveyName {
-    /// Rays of a scan where nothing else is asked for.
+    /// Default number of rays of a scan.
     pub const RAYS: u32 = 8_000;
 
-    /// The scans from number `first` on, without end, those of city surveys of about `rays` rays (street and indoor
-    /// have their own number). The same seed gives the same scans on every platform.
+    /// Endless iterator over the scans from number `first`. Scans of city surveys have about `rays` rays; street and
+    /// indoor have a fixed number. The same seed gives the same scans on every platform.
     pub fn scans(self, seed: u64, first: usize, rays: u32) -> Box<dyn Iterator<Item = Scan>> {
         match self {
             Self::Street => Box::new(Survey::street(seed).skip(first)),
@@ -45,7 +45,7 @@ impl SurveyName {
         }
     }
 
-    /// Metres from one scan to the next; `None` where there is no way between them.
+    /// Distance between scans, in metres; `None` if the positions are random.
     pub fn spacing_m(self) -> Option<f64> {
         match self {
             Self::Street | Self::Drive | Self::Laps => Some(1.0),
@@ -55,7 +55,7 @@ impl SurveyName {
         }
     }
 
-    /// What it is called on the command line.
+    /// Name on the command line.
     pub fn name(self) -> &'static str {
         match self {
             Self::Street => "street",
@@ -68,7 +68,7 @@ impl SurveyName {
         }
     }
 
-    /// What tells these scans from others, in a scan stream.
+    /// Label in a scan stream that identifies these scans.
     pub fn label(self, seed: u64, first: usize, rays: u32) -> String {
         let name = self.name();
         match self {
@@ -83,7 +83,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn names_are_those_of_the_command_line_and_labels_tell_surveys_apart() {
+    fn names_match_the_command_line_and_labels_are_unique() {
         let mut labels = std::collections::BTreeSet::new();
         for survey in SurveyName::value_variants() {
             assert_eq!(SurveyName::from_str(survey.name(), false).as_ref(), Ok(survey));
@@ -96,7 +96,7 @@ mod tests {
     }
 
     #[test]
-    fn scans_begin_at_the_number_asked_for() {
+    fn scans_begin_at_the_requested_number() {
         for &survey in SurveyName::value_variants() {
             let mut scans = survey.scans(1, 0, 200);
             let (second, alone) = (scans.nth(1), survey.scans(1, 1, 200).next());

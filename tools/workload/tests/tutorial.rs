@@ -1,19 +1,19 @@
-//! What the pages tell readers to type: the tutorial from top to bottom, and the README's example with its answer.
+//! Runs the commands of the documents: the tutorial from top to bottom, and the README's example with its output.
 
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-/// Begins the comment before a block that readers run and the test does not; the rest of the comment says why.
+/// Begins a comment before a block that the test does not run, followed by the reason.
 const SKIP: &str = "<!-- not run by the test: ";
 
 /// A fenced block of a page.
 struct Block {
-    /// Of its first line, counted from 1.
+    /// Number of its first line, counted from 1.
     line: usize,
     language: String,
     text: String,
-    /// Why it is not run, where the page says so.
+    /// Reason for not running it, if any.
     skipped: Option<String>,
 }
 
@@ -41,13 +41,14 @@ fn blocks(page: &str) -> Vec<Block> {
     blocks
 }
 
-/// The folder of `voxtile`, which `cargo test --workspace` makes too. `None`, after saying so, where it is not there.
+/// Folder of the program `voxtile`, which `cargo test --workspace` builds. Prints a line and returns `None` if it is
+/// missing.
 fn programs() -> Option<PathBuf> {
     let folder = Path::new(env!("CARGO_BIN_EXE_workload")).parent().unwrap();
     if folder.join("voxtile").is_file() {
         return Some(folder.to_owned());
     }
-    println!("skipped: there is no voxtile in {}; cargo test --workspace makes it", folder.display());
+    println!("skipped: voxtile is missing in {}; cargo test --workspace builds it", folder.display());
     None
 }
 
@@ -69,8 +70,8 @@ fn the_tutorial_runs_from_top_to_bottom() {
 
     let folder = tempfile::tempdir().unwrap();
     let path = format!("{}:{}", programs.display(), std::env::var("PATH").unwrap());
-    // An error of one command ends it, also on the left of a pipe. A command that is repeated until it succeeds does
-    // not hang it.
+    // The script ends at the first error, also on the left of a pipe. A timeout ends commands that are repeated until
+    // they succeed.
     let head = "trap 'echo \"docs/tutorial.md: the block at line $at fails: $BASH_COMMAND\" >&2' ERR\n";
     let run = Command::new("timeout")
         .args(["600", "bash", "-Eeuo", "pipefail", "-c", &format!("{head}{script}")])
@@ -78,16 +79,16 @@ fn the_tutorial_runs_from_top_to_bottom() {
         .env("PATH", path)
         .output()
         .unwrap();
-    let said = String::from_utf8_lossy(&run.stderr);
-    assert!(run.status.success(), "{}: {said}", run.status);
-    // What the page says that there is afterwards.
+    let errors = String::from_utf8_lossy(&run.stderr);
+    assert!(run.status.success(), "{}: {errors}", run.status);
+    // The files that exist afterwards according to the page.
     for file in ["voxtile_demo/map.png", "walls.ply", "city.bt", "moved.bt.origin.json"] {
         assert!(folder.path().join("tutorial").join(file).is_file(), "{file}");
     }
 }
 
 #[test]
-fn the_readmes_example_answers_as_printed() {
+fn the_readmes_example_gives_the_printed_output() {
     let Some(programs) = programs() else { return };
     let readme = page("README.md");
     let examples: Vec<Block> =

@@ -1,37 +1,38 @@
-//! Does anything grow where a robot goes the same rounds all day?
+//! Does anything grow while a robot repeats the same round all day?
 
 use crate::case::{Case, Input};
 use crate::day::{Day, DayFound, Part};
 use crate::findings::Findings;
 use crate::promise::{Promise, Wanted};
 use crate::setting::{Setting, mib};
-use crate::task::Apart;
+use crate::task::ChildTask;
 use anyhow::{Context, Result};
 use report::plot::{Content, Line, Panel, Plot, Scale};
 use report::{Cell, Table};
 use voxtile::Storage;
 use workload::SurveyName;
 
-/// Rays of a scan. The short day makes up for its few scans.
+/// Rays of a scan. The short day has more, to compensate for its few scans.
 const RAYS: u32 = 1_000;
 const RAYS_SHORT: u32 = 4_000;
-/// Scans of the survey in a second, of which one in so many is taken: so the day takes half an hour and not two.
+/// Scans a second of the survey. The day uses every n-th of them (`EVERY`), so that it takes half an hour instead of
+/// two.
 const SURVEYED_PER_S: usize = 10;
 const EVERY: usize = 4;
 const EVERY_SHORT: usize = 96;
 const HOURS: usize = 12;
 const FLUSH_EVERY_S: usize = 10;
 const FLUSH_EVERY_SCANS_SHORT: usize = 100;
-/// Scans of a round, a metre a second.
+/// Scans of a round, at 1 m/s.
 const SCANS_PER_ROUND: usize = 24_000;
-/// The last part by the middle one, in which everything has been seen often.
+/// Maximum ratio of the last part to the middle one. By the middle, everything has been seen often.
 const MAX_GROWTH: f64 = 1.05;
-/// The same of bytes on disk: counts of observations go on to grow, and with them the number of different states in a
-/// tile, ever more slowly.
+/// The same for bytes on disk. Counts of observations still increase, and with them, ever more slowly, the number of
+/// different states in a tile.
 const MAX_DISK_GROWTH: f64 = 1.25;
-/// The same of a short day, whose voxels have not been seen often enough to stay as they are.
+/// The same for a short day, whose voxels have not been seen often enough to be stable.
 const MAX_GROWTH_SHORT: f64 = 1.5;
-/// The same of times.
+/// The same for times.
 const MAX_SLOWER: f64 = 1.15;
 
 pub fn answer(setting: &Setting) -> Result<Findings> {
@@ -49,13 +50,13 @@ pub fn answer(setting: &Setting) -> Result<Findings> {
     let day = Day {
         case,
         memory_bytes: setting.size(64, 24) << 20,
-        // The other one writes thirty times the bytes.
+        // `Storage::OctoMap` writes thirty times the bytes.
         storage: Storage::Compact,
         flush_every_scans: setting.size(FLUSH_EVERY_S * SURVEYED_PER_S / EVERY, FLUSH_EVERY_SCANS_SHORT),
         scans_per_part: setting.size(scans / HOURS, SCANS_PER_ROUND / EVERY_SHORT),
         folder: setting.work.join("day"),
     };
-    let found = day.clone().apart()?;
+    let found = day.clone().run_in_child()?;
     let mut findings = Findings::default();
     findings.keep(&day, &found)?;
     let most_growth = setting.size([MAX_GROWTH, MAX_DISK_GROWTH], [MAX_GROWTH_SHORT; 2]);
@@ -71,7 +72,7 @@ fn promises(
     [most_growth, most_disk_growth]: [f64; 2],
 ) -> Result<Vec<Promise>> {
     let middle = found.parts.get(found.parts.len() / 2);
-    let (middle, last) = middle.zip(found.parts.last()).context("a day has a part or more")?;
+    let (middle, last) = middle.zip(found.parts.last()).context("a day has at least one part")?;
     let growth = |what: &str, most, of: fn(&Part) -> f64| {
         let what = format!("{what}, last part of the day by the middle one");
         Promise::new(what, of(last) / of(middle), Wanted::AtMost(most), "")

@@ -1,24 +1,24 @@
-//! Can a map that is twenty times as large as the memory be exported?
+//! Can a map be exported in a twentieth of its memory?
 
-use super::memory::BESIDE_MIB;
+use super::memory::OVERHEAD_MIB;
 use crate::build::{Build, remove_folder};
 use crate::case::Limit;
 use crate::export::{Export, ExportFormat};
 use crate::findings::Findings;
 use crate::promise::{Promise, Wanted};
-use crate::setting::{RAYS, Setting, made_up, mib};
-use crate::task::Apart;
+use crate::setting::{RAYS, Setting, mib, synthetic};
+use crate::task::ChildTask;
 use anyhow::Result;
 use report::{Cell, Table};
 use workload::SurveyName;
 
-/// Bytes of a map's tiles in memory by those that its export may use.
+/// Ratio of the bytes of a map's tiles in memory to the memory of the export.
 const TIMES: u64 = 20;
 
 pub fn answer(setting: &Setting) -> Result<Findings> {
-    let case = made_up("drive", (SurveyName::Drive, RAYS, setting.size(1_500, 200)), [0.1, 10.0, 60.0]);
+    let case = synthetic("drive", (SurveyName::Drive, RAYS, setting.size(1_500, 200)), [0.1, 10.0, 60.0]);
     let build = Build { is_kept: true, has_digest: false, ..setting.build(&case, Limit::None) };
-    let built = build.clone().apart()?;
+    let built = build.clone().run_in_child()?;
     let memory_bytes = (built.tile_bytes / TIMES) as usize;
     let mut findings = Findings::default();
     findings.keep_build(&build, &built)?;
@@ -32,7 +32,7 @@ pub fn answer(setting: &Setting) -> Result<Findings> {
     for format in ExportFormat::ALL {
         let folder = setting.work.join("export");
         let export = Export { map: build.folder.clone(), format, memory_bytes, folder };
-        let exported = export.clone().apart()?;
+        let exported = export.clone().run_in_child()?;
         findings.keep(&export, &exported)?;
         let peak_mib = mib(exported.peak_resident_bytes as f64);
         let start_mib = mib(exported.start_resident_bytes as f64);
@@ -47,7 +47,7 @@ pub fn answer(setting: &Setting) -> Result<Findings> {
         ]);
         let what = format!(".{}: peak of memory beyond the limit", format.name());
         let beyond_mib = peak_mib - mib(memory_bytes as f64);
-        findings.promises.push(Promise::new(what, beyond_mib, Wanted::AtMost(BESIDE_MIB), "MiB"));
+        findings.promises.push(Promise::new(what, beyond_mib, Wanted::AtMost(OVERHEAD_MIB), "MiB"));
     }
     remove_folder(&build.folder)?;
     findings.answer.tables = vec![table];

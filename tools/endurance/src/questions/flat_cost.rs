@@ -1,58 +1,58 @@
-//! Does a scan cost the same however far the map has come, and however many tiles it has?
+//! Is the cost of a scan independent of the distance travelled and of the number of tiles?
 
 use crate::build::{Build, Built, ScanCost};
 use crate::case::{Case, Limit};
 use crate::findings::Findings;
 use crate::promise::{Promise, Wanted};
-use crate::setting::{RAYS, Setting, made_up};
-use crate::task::Apart;
+use crate::setting::{RAYS, Setting, synthetic};
+use crate::task::ChildTask;
 use anyhow::Result;
 use report::plot::{Content, Line, Panel, Plot, Scale};
 use report::{Cell, Samples, Table};
 use workload::SurveyName;
 
-/// Scans that are made before they are inserted one after another.
+/// Number of scans generated before they are inserted one after another.
 const SCANS_AT_A_TIME: usize = 50;
-/// Cost of the last stretch by that of the second.
+/// Maximum ratio of the cost in the last stretch to that in the second.
 const MAX_GROWTH: f64 = 1.15;
-/// Slow scans by the median.
+/// Maximum ratio of the 99th percentile to the median.
 const MAX_SLOW: f64 = 3.0;
-/// Windows of a plot.
+/// Number of windows of a plot.
 const WINDOWS: usize = 40;
 
-/// One of the clocks.
+/// Name of a clock, and the time that it measured for a scan.
 type Clock = (&'static str, fn(&ScanCost) -> f64);
 const CLOCKS: [Clock; 2] = [("CPU", |scan| scan.cpu_ms), ("wall", |scan| scan.wall_ms)];
 
-/// A way, and how it is looked at.
-struct Way {
+/// A trajectory and its evaluation.
+struct Trajectory {
     case: Case,
     stretch_m: f64,
-    /// Names of its table of stretches, its table of latencies and its plot.
+    /// Names of the table of stretches, the table of latencies and the plot.
     files: [&'static str; 3],
 }
 
 pub fn answer(setting: &Setting) -> Result<Findings> {
     let way = |metres| (SurveyName::Drive, RAYS, metres);
-    let long = Way {
-        case: made_up("drive", way(setting.size(20_000, 300)), [0.2, 10.0, 60.0]),
+    let long = Trajectory {
+        case: synthetic("drive", way(setting.size(20_000, 300)), [0.2, 10.0, 60.0]),
         stretch_m: setting.size(1_000.0, 50.0),
         files: ["flat_cost", "latency", "flat_cost"],
     };
-    let small_tiles = Way {
-        case: made_up("small tiles", way(setting.size(3_000, 60)), [0.1, 2.5, 60.0]),
+    let small_tiles = Trajectory {
+        case: synthetic("small tiles", way(setting.size(3_000, 60)), [0.1, 2.5, 60.0]),
         stretch_m: setting.size(500.0, 20.0),
         files: ["flat_cost_small_tiles", "latency_small_tiles", "flat_cost_small_tiles"],
     };
     let limit_mib = setting.size(64, 24);
     let mut findings = Findings::default();
-    for Way { case, stretch_m, files: [of_stretches, of_latencies, of_plot] } in [long, small_tiles] {
+    for Trajectory { case, stretch_m, files: [of_stretches, of_latencies, of_plot] } in [long, small_tiles] {
         let build = Build {
             scans_at_a_time: SCANS_AT_A_TIME,
             has_digest: false,
             ..setting.build(&case, Limit::Bytes(limit_mib << 20))
         };
-        let built = build.clone().apart()?;
+        let built = build.clone().run_in_child()?;
         findings.keep_build(&build, &built)?;
         findings.promises.extend(promises(&case.name, &built, stretch_m));
         let tiles = built.tiles;
@@ -78,23 +78,23 @@ fn promises(case: &str, built: &Built, stretch_m: f64) -> Vec<Promise> {
     growth.into_iter().chain([Promise::about_time(what, slow, Wanted::AtMost(MAX_SLOW), "")]).collect()
 }
 
-/// The scans of a stretch of the way, the first being 0.
+/// The scans of a stretch of the trajectory, counted from 0.
 fn stretch(built: &Built, stretch_m: f64, number: usize) -> &[ScanCost] {
     let from = |metres: f64| built.scans.partition_point(|scan| scan.distance_m < metres);
     let begin_m = number as f64 * stretch_m;
     &built.scans[from(begin_m)..from(begin_m + stretch_m)]
 }
 
-/// The scans of the last stretch that is whole.
+/// The scans of the last complete stretch.
 fn last_stretch(built: &Built, stretch_m: f64) -> &[ScanCost] {
     let end_m = built.scans.last().map_or(0.0, |scan| scan.distance_m);
     let first = built.scans.partition_point(|scan| scan.distance_m <= end_m - stretch_m);
     &built.scans[first..]
 }
 
-/// The scans from the first on for which something had been written: from there on, tiles go for others.
+/// The scans during which tiles are evicted: those after the first write.
 fn evicting(built: &Built) -> &[ScanCost] {
-    // A new map has its metadata and its log.
+    // A new map has written its metadata and log.
     let begin = built.scans.first().map_or(0, |scan| scan.bytes_written);
     &built.scans[built.scans.partition_point(|scan| scan.bytes_written <= begin)..]
 }
@@ -168,7 +168,7 @@ fn plot(file: &'static str, built: &Built, case: &str) -> Plot {
 mod tests {
     use super::*;
 
-    /// A scan every metre; nothing is pushed out before the hundredth.
+    /// A scan every metre, without eviction before the hundredth.
     fn built(metres: usize) -> Built {
         let scans = (0..metres).map(|k| ScanCost {
             distance_m: k as f64,

@@ -1,38 +1,38 @@
-//! How long does a scan wait where the map is flushed every ten seconds?
+//! How long does a scan wait if the map is flushed every ten seconds?
 
 use crate::build::{Build, Built, Flushes};
 use crate::case::Limit;
 use crate::findings::Findings;
 use crate::metered_disk::DiskSpeed;
 use crate::promise::{Promise, Wanted};
-use crate::setting::{RAYS, Setting, made_up, mib};
-use crate::task::Apart;
+use crate::setting::{RAYS, Setting, mib, synthetic};
+use crate::task::ChildTask;
 use anyhow::Result;
 use report::{Cell, Table};
 use voxtile::Storage;
 use workload::SurveyName;
 
-/// Worst of a thousand calls by their median.
+/// Maximum ratio of the 99.9th percentile of the calls to their median.
 const MAX_BY_MEDIAN: f64 = 4.0;
-/// Worst of all calls, those that flush among them, in milliseconds.
+/// Maximum duration of a call, including flushes, in milliseconds.
 const MAX_MS: f64 = 100.0;
-/// CPU time by that of flushes that stop the mapper.
+/// Maximum ratio of the CPU time with background flushes to that with blocking ones.
 const MAX_CPU: f64 = 1.1;
-/// What the slow disk moves in a second, reads and writes together.
+/// Speed of the slow disk, reads and writes together.
 const SLOW: DiskSpeed = DiskSpeed::BytesPerSecond(40e6);
-/// As the command has it.
+/// The default of the command.
 const LIMIT: Limit = Limit::Bytes(512 << 20);
 
-/// A drive on a disk with one kind of flush.
-struct Driven {
+/// Result of a drive on one disk with one kind of flush.
+struct Run {
     disk: &'static str,
-    is_beside: bool,
+    is_background: bool,
     built: Built,
 }
 
 pub fn answer(setting: &Setting) -> Result<Findings> {
     let scans = setting.size(5_000, 60);
-    let case = made_up("drive", (SurveyName::Drive, RAYS, scans), [0.1, 10.0, 60.0]);
+    let case = synthetic("drive", (SurveyName::Drive, RAYS, scans), [0.1, 10.0, 60.0]);
     let disks: &[(&str, DiskSpeed, Storage)] = setting.size(
         &[
             ("own speed", DiskSpeed::Own, Storage::OctoMap),
@@ -42,40 +42,40 @@ pub fn answer(setting: &Setting) -> Result<Findings> {
         &[("not synced", DiskSpeed::Unsynced, Storage::OctoMap)],
     );
     let mut findings = Findings::default();
-    let mut driven = Vec::new();
+    let mut runs = Vec::new();
     for &(disk, speed, storage) in disks {
-        for is_beside in [false, true] {
+        for is_background in [false, true] {
             let (every_scans, period_s) = setting.size((100, 0.1), (10, 0.0));
-            let flushes = Some(Flushes { every_scans, period_s, is_beside });
+            let flushes = Some(Flushes { every_scans, period_s, is_background });
             let build = Build { disk: speed, storage, flushes, ..setting.build(&case, LIMIT) };
-            let built = build.clone().apart()?;
+            let built = build.clone().run_in_child()?;
             findings.keep_build(&build, &built)?;
-            driven.push(Driven { disk, is_beside, built });
+            runs.push(Run { disk, is_background, built });
         }
     }
-    for pair in driven.chunks(2) {
-        let [stopped, beside] = pair else { continue };
-        let disk = beside.disk;
-        let by_median = beside.insert_ms(0.999) / beside.insert_ms(0.5);
-        let cpu = beside.built.cpu_s() / stopped.built.cpu_s();
+    for pair in runs.chunks(2) {
+        let [blocking, background] = pair else { continue };
+        let disk = background.disk;
+        let by_median = background.insert_ms(0.999) / background.insert_ms(0.5);
+        let cpu = background.built.cpu_s() / blocking.built.cpu_s();
         let promise = |what: &str, found, wanted, unit| {
             Promise::about_time(format!("{disk}: {what}"), found, Wanted::AtMost(wanted), unit)
         };
         findings.promises.extend([
             promise("p99.9 of a scan by the median", by_median, MAX_BY_MEDIAN, ""),
-            promise("longest call", beside.insert_ms(1.0).max(beside.flush_ms()), MAX_MS, "ms"),
+            promise("longest call", background.insert_ms(1.0).max(background.flush_ms()), MAX_MS, "ms"),
             promise("CPU time by that of flushes that stop", cpu, MAX_CPU, ""),
         ]);
-        let differ = f64::from(u8::from(stopped.built.digest != beside.built.digest));
+        let differ = f64::from(u8::from(blocking.built.digest != background.built.digest));
         let what = format!("{disk}: digests that differ from that of flushes that stop");
         findings.promises.push(Promise::new(what, differ, Wanted::AtMost(0.0), ""));
     }
-    findings.answer.tables = vec![table(&case.description(), &driven)];
+    findings.answer.tables = vec![table(&case.description(), &runs)];
     Ok(findings)
 }
 
-impl Driven {
-    /// Wall time of the call that inserts a scan, at a quantile.
+impl Run {
+    /// Wall time of `insert_scan` at a quantile, in milliseconds.
     fn insert_ms(&self, quantile: f64) -> f64 {
         let mut times: Vec<f64> = self.built.scans.iter().map(|scan| scan.wall_ms).collect();
         times.sort_unstable_by(f64::total_cmp);
@@ -83,16 +83,16 @@ impl Driven {
         times.get(at.saturating_sub(1)).copied().unwrap_or(f64::NAN)
     }
 
-    /// Longest call that flushed.
+    /// Longest call that flushed, in milliseconds.
     fn flush_ms(&self) -> f64 {
         self.built.scans.iter().map(|scan| scan.flush_ms).fold(0.0, f64::max)
     }
 }
 
-fn table(case: &str, driven: &[Driven]) -> Table {
+fn table(case: &str, runs: &[Run]) -> Table {
     let caption = format!(
         "Wall time of calls at ten scans a second with a flush every ten seconds, limit 512 MiB, storage `octomap` where nothing else is said; {case}. \
-         A flush beside the mapper returns once it has begun."
+         A background flush returns once it has begun."
     );
     let columns = [
         "disk",
@@ -107,10 +107,10 @@ fn table(case: &str, driven: &[Driven]) -> Table {
         "tiles",
     ];
     let mut table = Table::new("flushes", caption, columns);
-    for of in driven {
+    for of in runs {
         table.push([
             of.disk.into(),
-            if of.is_beside { "beside" } else { "stops" }.into(),
+            if of.is_background { "background" } else { "stops" }.into(),
             Cell::Number(of.insert_ms(0.5), 1),
             Cell::Number(of.insert_ms(0.99), 1),
             Cell::Number(of.insert_ms(0.999), 1),

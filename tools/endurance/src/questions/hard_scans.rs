@@ -1,6 +1,6 @@
-//! Does the memory stay where it is wanted, whatever the scan, the tiles and the file?
+//! Does the memory stay within the limit for any scan, tile size and file?
 
-use super::memory::BESIDE_MIB;
+use super::memory::OVERHEAD_MIB;
 use crate::findings::Findings;
 use crate::hard_scan::{HardScan, Points, Taken};
 use crate::promise::{Promise, Wanted};
@@ -10,7 +10,7 @@ use report::{Cell, Table};
 use std::fs;
 use workload::SurveyName;
 
-/// How many times the CPU time without a limit a map may take within one.
+/// Maximum ratio of the CPU time with a limit to that without one.
 const MAX_TIMES_CPU: f64 = 4.0;
 
 pub fn answer(setting: &Setting) -> Result<Findings> {
@@ -39,7 +39,7 @@ pub fn answer(setting: &Setting) -> Result<Findings> {
             Promise::new(format!("{}: {what}", hard.name), found, wanted, unit)
         };
         findings.promises.extend([
-            promise("peak of memory beyond the limit", beyond_mib, Wanted::AtMost(BESIDE_MIB), "MiB"),
+            promise("peak of memory beyond the limit", beyond_mib, Wanted::AtMost(OVERHEAD_MIB), "MiB"),
             promise(
                 "digests that are not that without a limit",
                 f64::from(u8::from(limited.digest != unlimited.digest)),
@@ -69,7 +69,7 @@ pub fn answer(setting: &Setting) -> Result<Findings> {
     Ok(findings)
 }
 
-/// Within the limit, and without one.
+/// Cost with the limit and without one.
 fn measured(setting: &Setting, hard: &HardScan) -> Result<[Taken; 2]> {
     let input = hard.write(&setting.work)?;
     let map = setting.work.join("hard");
@@ -78,7 +78,7 @@ fn measured(setting: &Setting, hard: &HardScan) -> Result<[Taken; 2]> {
     Ok(taken)
 }
 
-/// Each once broke the limit. A short run has smaller ones of the same kinds.
+/// Each of these inputs once exceeded the limit. A short run uses smaller ones of the same kinds.
 fn cases(setting: &Setting) -> Vec<HardScan> {
     let fan = |rays: [u32; 2], reach_m: [f64; 2], opening, is_sky| Points::Fan {
         scans: 1,

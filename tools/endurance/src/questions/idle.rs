@@ -1,26 +1,26 @@
-//! Does a mapper that has nothing to do take any of the processor?
+//! Does an idle mapper use the processor?
 
 use crate::findings::Findings;
 use crate::idle::Idle;
 use crate::promise::{Promise, Wanted};
-use crate::setting::{RAYS, Setting, made_up};
-use crate::task::Apart;
+use crate::setting::{RAYS, Setting, synthetic};
+use crate::task::ChildTask;
 use anyhow::Result;
 use report::{Cell, Table};
 use workload::SurveyName;
 
-/// Share of a core, in percent: what the clock itself cannot tell from nothing.
+/// Share of a core, in percent: the resolution of the clock.
 const MAX_PERCENT: f64 = 0.1;
 
 pub fn answer(setting: &Setting) -> Result<Findings> {
-    let case = made_up("drive", (SurveyName::Drive, RAYS, 60), [0.1, 5.0, 60.0]);
+    let case = synthetic("drive", (SurveyName::Drive, RAYS, 60), [0.1, 5.0, 60.0]);
     let idle = Idle {
         case: case.clone(),
         memory_bytes: 24 << 20,
         idle_s: setting.size(10.0, 3.0),
         folder: setting.work.join("idle"),
     };
-    let idled = idle.clone().apart()?;
+    let idled = idle.clone().run_in_child()?;
     let mut findings = Findings::default();
     findings.keep(&idle, &idled)?;
     let percent = 100.0 * idled.cpu_s / idled.wall_s;

@@ -1,26 +1,27 @@
-//! Does the memory stay where it is wanted, wherever the sensor goes?
+//! Does the memory stay within the limit for any trajectory?
 
 use crate::build::{Build, Built};
 use crate::case::{Case, Limit};
 use crate::findings::Findings;
 use crate::metered_disk::DiskSpeed;
 use crate::promise::{Promise, Wanted};
-use crate::setting::{RAYS, Setting, made_up, mib};
-use crate::task::Apart;
+use crate::setting::{RAYS, Setting, mib, synthetic};
+use crate::task::ChildTask;
 use anyhow::Result;
 use report::plot::{Content, Line, Panel, Plot, Scale};
 use report::{Cell, Table};
 use workload::SurveyName;
 
-/// What a process may take beside its limit, in MiB: its program, the scan, the clocks' samples.
-pub const BESIDE_MIB: f64 = 48.0;
-/// Inputs that are mapped on a slow disk, too.
-const PILES_UP: [&str; 1] = ["teleports"];
-/// How slow it is; the other where the run is to be short.
+/// Memory that a process may use in addition to its limit, in MiB: the program, the scan, the samples of the
+/// measurement.
+pub const OVERHEAD_MIB: f64 = 48.0;
+/// Inputs that are also mapped on a slow disk, where writes accumulate.
+const ON_SLOW_DISK: [&str; 1] = ["teleports"];
+/// Speed of the slow disk; a short run uses the faster one.
 const SLOW: DiskSpeed = DiskSpeed::BytesPerSecond(40e6);
 const LESS_SLOW: DiskSpeed = DiskSpeed::BytesPerSecond(100e6);
 
-/// A map built in memory and with some limits.
+/// A map built in memory and with several limits.
 struct Measured {
     case: Case,
     in_memory: Built,
@@ -30,7 +31,7 @@ struct Measured {
 /// A map built with a limit.
 struct Limited {
     limit_mib: usize,
-    /// Whether its disk was slow, so that what is to be written may pile up.
+    /// Whether the disk was slow, so that writes could accumulate.
     is_slow: bool,
     built: Built,
 }
@@ -42,12 +43,12 @@ pub fn answer(setting: &Setting) -> Result<Findings> {
     for case in cases(setting) {
         let mut build = |limit, disk| {
             let build = Build { disk, ..setting.build(&case, limit) };
-            let built = build.clone().apart()?;
+            let built = build.clone().run_in_child()?;
             findings.keep_build(&build, &built)?;
             anyhow::Ok(built)
         };
         let in_memory = build(Limit::InMemory, DiskSpeed::Unsynced)?;
-        let slow = PILES_UP.contains(&case.name.as_str()).then_some((limits_mib[0], true));
+        let slow = ON_SLOW_DISK.contains(&case.name.as_str()).then_some((limits_mib[0], true));
         let mut limited = Vec::new();
         for (limit_mib, is_slow) in limits_mib.iter().map(|&limit_mib| (limit_mib, false)).chain(slow) {
             let disk = if is_slow { setting.size(SLOW, LESS_SLOW) } else { DiskSpeed::Unsynced };
@@ -64,37 +65,37 @@ pub fn answer(setting: &Setting) -> Result<Findings> {
     Ok(findings)
 }
 
-/// Ways and places that are each hard on memory for a reason of their own.
+/// Trajectories that need much memory, each for its own reason.
 fn cases(setting: &Setting) -> Vec<Case> {
     let made = |survey, rays, scans: [usize; 2]| (survey, rays, setting.size(scans[0], scans[1]));
     let mut cases: Vec<Case> =
         if setting.is_short { Vec::new() } else { setting.riverside(10.0).into_iter().collect() };
     let fine = setting.size([0.2, 10.0, 60.0], [0.1, 5.0, 60.0]);
     cases.extend([
-        made_up("drive", made(SurveyName::Drive, RAYS, [5_000, 60]), fine),
-        made_up("teleports", made(SurveyName::Teleport, RAYS, [100, 25]), [0.2, 10.0, 60.0]),
-        made_up("dense", made(SurveyName::Drive, RAYS, [100, 30]), [0.05, 2.5, 20.0]),
-        made_up("masts", made(SurveyName::Mast, RAYS, [8, 2]), [0.4, 10.0, 100.0]),
+        synthetic("drive", made(SurveyName::Drive, RAYS, [5_000, 60]), fine),
+        synthetic("teleports", made(SurveyName::Teleport, RAYS, [100, 25]), [0.2, 10.0, 60.0]),
+        synthetic("dense", made(SurveyName::Drive, RAYS, [100, 30]), [0.05, 2.5, 20.0]),
+        synthetic("masts", made(SurveyName::Mast, RAYS, [8, 2]), [0.4, 10.0, 100.0]),
     ]);
     cases
 }
 
 impl Measured {
-    /// How many digests are not that of the map in memory.
+    /// Number of digests that differ from that of the map in memory.
     fn wrong_digests(&self) -> usize {
         self.limited.iter().filter(|limited| limited.built.digest != self.in_memory.digest).count()
     }
 
     fn promises(&self) -> Vec<Promise> {
         let name = &self.case.name;
-        let beside = self.limited.iter().map(Limited::beside_mib);
+        let beyond = self.limited.iter().map(Limited::beyond_mib);
         let least_limit_mib =
             self.limited.iter().map(|limited| limited.limit_mib as f64).fold(f64::NAN, f64::min);
         vec![
             Promise::new(
                 format!("{name}: peak of memory beyond the limit, largest"),
-                beside.fold(f64::NAN, f64::max),
-                Wanted::AtMost(BESIDE_MIB),
+                beyond.fold(f64::NAN, f64::max),
+                Wanted::AtMost(OVERHEAD_MIB),
                 "MiB",
             ),
             Promise::new(
@@ -103,11 +104,11 @@ impl Measured {
                 Wanted::AtMost(0.0),
                 "",
             ),
-            // Otherwise the first promise would be cheap.
+            // Ensures that the limit is well below the memory that the map needs.
             Promise::new(
                 format!("{name}: peak of the map in memory, beyond the least limit"),
                 mib(self.in_memory.peak_resident_bytes as f64) - least_limit_mib,
-                Wanted::AtLeast(BESIDE_MIB),
+                Wanted::AtLeast(OVERHEAD_MIB),
                 "MiB",
             ),
         ]
@@ -138,8 +139,8 @@ impl Limited {
         format!("{} MiB{}", self.limit_mib, if self.is_slow { ", slow disk" } else { "" })
     }
 
-    /// The peak of the process beyond the limit, in MiB.
-    fn beside_mib(&self) -> f64 {
+    /// Peak of the process beyond the limit, in MiB.
+    fn beyond_mib(&self) -> f64 {
         mib(self.built.peak_resident_bytes as f64) - self.limit_mib as f64
     }
 }
@@ -161,9 +162,9 @@ fn table(measured: &[Measured]) -> Table {
     ];
     let mut table = Table::new("memory", caption, columns);
     for Measured { case, in_memory, limited } in measured {
-        let limits = limited.iter().map(|limited| (limited.name(), limited.beside_mib(), &limited.built));
+        let limits = limited.iter().map(|limited| (limited.name(), limited.beyond_mib(), &limited.built));
         let all = [("in memory".to_owned(), f64::NAN, in_memory)].into_iter().chain(limits);
-        for (limit, beside_mib, built) in all {
+        for (limit, beyond_mib, built) in all {
             table.push([
                 Cell::Text(case.name.clone()),
                 Cell::Text(case.description()),
@@ -171,7 +172,7 @@ fn table(measured: &[Measured]) -> Table {
                 Cell::Count(built.scans.len() as u64),
                 Cell::Count(built.tiles),
                 Cell::Number(mib(built.peak_resident_bytes as f64), 1),
-                Cell::Number(beside_mib, 1),
+                Cell::Number(beyond_mib, 1),
                 Cell::Count(built.saves),
                 Cell::Count(built.loads),
                 Cell::Text(built.digest.chars().take(8).collect()),

@@ -1,4 +1,4 @@
-//! The questions, one a file.
+//! The questions, one per file.
 
 mod day;
 mod export;
@@ -17,15 +17,15 @@ use anyhow::Result;
 
 /// A question about the mapper.
 pub struct Question {
-    /// Its section in the page, and what `--only` takes.
+    /// Section of the page, and value of `--only`.
     pub name: &'static str,
-    /// The file of its promises, without its ending.
+    /// File of the promises, without extension.
     pub promises: &'static str,
-    /// Measures.
+    /// Measures the answer.
     pub answer: fn(&Setting) -> Result<Findings>,
 }
 
-/// All of them, in the order of the page.
+/// All questions, in the order of the page.
 pub const QUESTIONS: [Question; 10] = [
     Question { name: "memory", promises: "memory_promises", answer: memory::answer },
     Question { name: "hard-scans", promises: "hard_scans_promises", answer: hard_scans::answer },

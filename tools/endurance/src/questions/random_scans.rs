@@ -1,6 +1,6 @@
-//! Does the memory stay where it is wanted for inputs that nobody thought of?
+//! Does the memory stay within the limit for random inputs?
 
-use super::memory::BESIDE_MIB;
+use super::memory::OVERHEAD_MIB;
 use crate::findings::Findings;
 use crate::hard_scan::{HardScan, Points};
 use crate::promise::{Promise, Wanted};
@@ -12,7 +12,7 @@ use voxtile::MemoryLimit;
 use voxtile::space::Grid;
 use voxtile_simulation::Random;
 
-/// The worst peak of random inputs in random limits.
+/// Finds the worst peak of random inputs with random limits.
 pub fn answer(setting: &Setting) -> Result<Findings> {
     let until = Instant::now() + Duration::from_secs(setting.size(600, 25));
     let mut random = Random::of(u64::from(std::process::id()), &[15]);
@@ -22,11 +22,12 @@ pub fn answer(setting: &Setting) -> Result<Findings> {
         let tile_voxels = [2.0, 3.0, 4.0, 9.0, 16.0, 31.0, 50.0, 64.0][random.below(8) as usize];
         let tile_size_m = tile_voxels * resolution_m;
         let least = MemoryLimit::min_bytes(&Grid::new(resolution_m, tile_size_m)?).div_ceil(1 << 20);
-        // Voxels of all rays, so that each takes a second or two.
+        // Number of voxels on all rays, so that each input takes a second or two.
         let voxels = random.between(1e5, setting.size(2e8, 1e7));
         let rays = 10_f64.powf(random.between(1.0, 5.3)).min(voxels);
         let reach_m = (voxels / rays).clamp(10.0, 100_000.0) * resolution_m;
-        // A folder a tile: of hundreds of thousands of small tiles the file system takes most of the time.
+        // With one folder per tile, the file system would take most of the time for hundreds of thousands of small
+        // tiles.
         let reach_m = reach_m.min(tile_size_m * 300_000.0 / rays).max(2.0 * resolution_m);
         let scans = [1, 1, 2, 5][random.below(4) as usize];
         let points = Points::Fan {
@@ -39,7 +40,7 @@ pub fn answer(setting: &Setting) -> Result<Findings> {
         let limit_mib = least + random.below(setting.size(200, 60)) as usize + 40;
         let name = format!("random {tried}");
         let per_ray = random.below(3) == 0;
-        // On a slow disk one begins anyway.
+        // Without this, a flush begins only on a slow disk.
         let is_flushed = random.below(2) == 0;
         let is_octomap = random.below(3) == 0;
         let mut options = Vec::new();
@@ -61,7 +62,7 @@ pub fn answer(setting: &Setting) -> Result<Findings> {
         let input = hard.write(&setting.work)?;
         let taken = match hard.build(&input, &setting.work.join("hard"), true) {
             Ok(taken) => taken,
-            // Too many tiles for the limit is an answer, too.
+            // An error about too many tiles for the limit is acceptable.
             Err(error) if error.to_string().contains("too few for a") => {
                 let _ = fs::remove_dir_all(setting.work.join("hard"));
                 continue;
@@ -78,6 +79,6 @@ pub fn answer(setting: &Setting) -> Result<Findings> {
     }
     let what = format!("worst of {tried} random inputs ({worst}): peak of memory beyond the limit");
     let mut findings = Findings::default();
-    findings.promises.push(Promise::new(what, worst_mib, Wanted::AtMost(BESIDE_MIB), "MiB"));
+    findings.promises.push(Promise::new(what, worst_mib, Wanted::AtMost(OVERHEAD_MIB), "MiB"));
     Ok(findings)
 }

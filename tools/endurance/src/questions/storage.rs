@@ -5,24 +5,25 @@ use crate::case::{Case, Limit};
 use crate::findings::Findings;
 use crate::metered_disk::DiskSpeed;
 use crate::promise::{Promise, Wanted};
-use crate::setting::{RAYS, Setting, made_up, mib};
-use crate::task::Apart;
+use crate::setting::{RAYS, Setting, mib, synthetic};
+use crate::task::ChildTask;
 use anyhow::Result;
 use report::{Cell, Samples, Table};
 use voxtile::Storage;
 use workload::SurveyName;
 
-/// What the slow disk moves in a second, reads and writes together.
+/// Speed of the slow disk, reads and writes together.
 const SLOW_BYTES_PER_S: f64 = 40e6;
-/// Bytes of a map's files with the original storage by those with compact storage.
+/// Minimum ratio of the map's bytes with octomap storage to those with compact storage.
 const MIN_SMALLER: f64 = 8.0;
-/// The limit beside none, in MiB: a fraction of each map.
+/// The limit that is measured in addition to no limit, in MiB: a fraction of each map.
 const LIMIT_MIB: usize = 64;
 const SHORT_LIMIT_MIB: usize = 24;
-/// Wall time with compact storage by that with the original: what repeated runs differ by is no loss.
+/// Maximum ratio of the wall time with compact storage to that with octomap storage. It allows for the noise of
+/// repeated runs.
 const MAX_TIME: f64 = 1.05;
 
-/// Builds of one map that differ in storage alone, the original first.
+/// Builds of one map that differ in storage only, octomap storage first.
 struct Measured {
     case: Case,
     disk: &'static str,
@@ -34,7 +35,7 @@ struct OfStorage {
     storage: Storage,
     wall_s: Samples,
     cpu_s: Samples,
-    /// Of the last run; the others differ in time alone.
+    /// Result of the last run; the others differ in time only.
     built: Built,
 }
 
@@ -61,13 +62,13 @@ pub fn answer(setting: &Setting) -> Result<Findings> {
 
 fn cases(setting: &Setting) -> Vec<Case> {
     if setting.is_short {
-        return vec![made_up("drive", (SurveyName::Drive, RAYS, 60), [0.1, 5.0, 60.0])];
+        return vec![synthetic("drive", (SurveyName::Drive, RAYS, 60), [0.1, 5.0, 60.0])];
     }
-    let drive = made_up("drive", (SurveyName::Drive, RAYS, 1_000), [0.2, 10.0, 60.0]);
+    let drive = synthetic("drive", (SurveyName::Drive, RAYS, 1_000), [0.2, 10.0, 60.0]);
     [drive].into_iter().chain(setting.riverside(10.0)).collect()
 }
 
-/// Builds the map with either storage in turn, as often as medians want.
+/// Builds the map with each storage in turn, `setting.runs` times.
 fn builds(
     setting: &Setting,
     case: &Case,
@@ -84,9 +85,9 @@ fn builds(
     for _ in 0..setting.runs {
         for of_storage in &mut builds {
             let storage = of_storage.storage;
-            // All scans before: nothing is done beside the time that is measured.
+            // All scans are generated before, so that nothing runs during the measured time.
             let build = Build { disk, storage, scans_at_a_time: usize::MAX, ..setting.build(case, limit) };
-            of_storage.built = build.clone().apart()?;
+            of_storage.built = build.clone().run_in_child()?;
             of_storage.wall_s.push(of_storage.built.wall_s());
             of_storage.cpu_s.push(of_storage.built.cpu_s());
             findings.keep_build(&build, &of_storage.built)?;

@@ -1,41 +1,41 @@
-//! How much of its speed does the mapper keep with memory for a quarter and a tenth of what it is at work on?
+//! How much of its speed does the mapper keep with memory for a quarter and a tenth of its working set?
 
 use crate::build::{Build, Built};
 use crate::case::{Case, Limit};
 use crate::findings::Findings;
 use crate::metered_disk::DiskSpeed;
 use crate::promise::{Promise, Wanted};
-use crate::setting::{RAYS, Setting, made_up, mib};
-use crate::task::Apart;
+use crate::setting::{RAYS, Setting, mib, synthetic};
+use crate::task::ChildTask;
 use crate::working_set::{WorkingSet, WorkingSetFound};
 use anyhow::Result;
 use report::plot::{Bars, Content, Panel, Plot};
 use report::{Cell, Samples, Table};
 use workload::SurveyName;
 
-/// Parts of the working set that are given, and the share of the speed without a limit that is wanted then.
+/// Divisors of the working set that give the limit, and the required share of the speed without a limit.
 const PARTS: [(f64, f64); 2] = [(4.0, 0.60), (10.0, 0.35)];
-/// Bytes written by bytes of the map's files.
+/// Maximum ratio of bytes written to bytes of the map's files.
 const MAX_WRITTEN: f64 = 4.0;
-/// What the slow disk moves in a second, reads and writes together.
+/// Speed of the slow disk, reads and writes together.
 const SLOW_BYTES_PER_S: f64 = 40e6;
 
-/// A map, and what its builds took on a disk.
+/// A map, and the costs of its builds on a disk.
 struct Measured {
     case: Case,
     working_set: WorkingSetFound,
     disk: &'static str,
-    /// The first has no limit.
+    /// The builds, first the one without a limit.
     builds: Vec<OfLimit>,
 }
 
-/// The builds with a limit.
+/// The builds with one limit.
 struct OfLimit {
     limit: Limit,
-    /// Share of the unlimited build's speed that is wanted; 0 of that itself.
+    /// Required share of the speed without a limit; 0 for no limit itself.
     wanted_share: f64,
     wall_s: Samples,
-    /// Of the last run; the others differ in time alone.
+    /// Result of the last run; the others differ in time only.
     built: Built,
 }
 
@@ -48,7 +48,7 @@ pub fn answer(setting: &Setting) -> Result<Findings> {
     );
     for case in cases(setting) {
         let working_set = WorkingSet { case: case.clone() };
-        let found = working_set.clone().apart()?;
+        let found = working_set.clone().run_in_child()?;
         findings.keep(&working_set, &found)?;
         for &(disk, speed) in disks {
             let mut builds = limits(&case, &found)?;
@@ -56,11 +56,11 @@ pub fn answer(setting: &Setting) -> Result<Findings> {
                 for of_limit in &mut builds {
                     let build = Build {
                         disk: speed,
-                        // All of them: nothing is done beside the time that is measured.
+                        // All scans are generated before, so that nothing runs during the measured time.
                         scans_at_a_time: usize::MAX,
                         ..setting.build(&case, of_limit.limit)
                     };
-                    of_limit.built = build.clone().apart()?;
+                    of_limit.built = build.clone().run_in_child()?;
                     of_limit.wall_s.push(of_limit.built.wall_s());
                     findings.keep_build(&build, &of_limit.built)?;
                 }
@@ -76,17 +76,17 @@ pub fn answer(setting: &Setting) -> Result<Findings> {
 
 fn cases(setting: &Setting) -> Vec<Case> {
     if setting.is_short {
-        return vec![made_up("dense", (SurveyName::Drive, 4_000, 60), [0.05, 2.5, 20.0])];
+        return vec![synthetic("dense", (SurveyName::Drive, 4_000, 60), [0.05, 2.5, 20.0])];
     }
-    let made_up = [
-        made_up("drive", (SurveyName::Drive, RAYS, 1_000), [0.2, 10.0, 60.0]),
-        made_up("fine drive", (SurveyName::Drive, RAYS, 100), [0.0625, 2.5, 60.0]),
-        made_up("dense", (SurveyName::Drive, RAYS, 100), [0.05, 2.5, 20.0]),
+    let synthetic = [
+        synthetic("drive", (SurveyName::Drive, RAYS, 1_000), [0.2, 10.0, 60.0]),
+        synthetic("fine drive", (SurveyName::Drive, RAYS, 100), [0.0625, 2.5, 60.0]),
+        synthetic("dense", (SurveyName::Drive, RAYS, 100), [0.05, 2.5, 20.0]),
     ];
-    made_up.into_iter().chain(setting.riverside(5.0)).collect()
+    synthetic.into_iter().chain(setting.riverside(5.0)).collect()
 }
 
-/// No limit, and parts of the working set. What is below the least limit that the mapper takes is raised to it.
+/// No limit, and fractions of the working set, raised to the smallest limit that the mapper accepts.
 fn limits(case: &Case, working_set: &WorkingSetFound) -> Result<Vec<OfLimit>> {
     let of_limit = |limit, wanted_share| OfLimit {
         limit,
@@ -107,7 +107,7 @@ fn limits(case: &Case, working_set: &WorkingSetFound) -> Result<Vec<OfLimit>> {
 }
 
 impl OfLimit {
-    /// The limit by what it is part of.
+    /// Name of the limit as a fraction of the working set.
     fn name(&self, working_set: &WorkingSetFound) -> String {
         match self.limit {
             Limit::Bytes(bytes) => format!("W/{:.1}", working_set.bytes as f64 / bytes as f64),
@@ -117,7 +117,7 @@ impl OfLimit {
 }
 
 impl Measured {
-    /// Speed by that without a limit.
+    /// Speed divided by that without a limit.
     fn share(&self, of_limit: &OfLimit) -> f64 {
         self.builds[0].wall_s.median() / of_limit.wall_s.median()
     }

@@ -4,31 +4,30 @@ use shuttle::sync::Arc;
 use shuttle::sync::atomic::{AtomicUsize, Ordering};
 use shuttle::thread;
 
-/// Tiles come back in the order in which they were sent, whether they are waited for or taken when they are there.
+/// Results arrive in the order of the jobs, from both `wait` and `take`.
 #[test]
-fn what_is_given_comes_back_once_and_in_order() {
+fn each_job_returns_once_and_in_order() {
     in_many_orders(|| {
         let mut worker = Worker::new("doubling", |number: u32| 2 * number);
-        let mut came = Vec::new();
+        let mut results = Vec::new();
         for number in 0..4 {
             worker.give(number);
-            came.extend(worker.take());
+            results.extend(worker.take());
             if number == 2 {
-                came.extend(worker.wait());
+                results.extend(worker.wait());
             }
         }
         while let Some(done) = worker.wait() {
-            came.push(done);
+            results.push(done);
         }
-        assert_eq!(came, [0, 2, 4, 6]);
+        assert_eq!(results, [0, 2, 4, 6]);
         assert_eq!((worker.in_flight(), worker.take()), (0, None));
     });
 }
 
-/// Two threads that carry beside each other, for an owner that goes away in the middle: nobody waits for ever, and
-/// nothing is done after that.
+/// Two concurrent workers whose owner drops them early: there is no deadlock, and no job runs after the drop.
 #[test]
-fn an_owner_that_goes_away_leaves_nothing_running() {
+fn a_dropped_worker_runs_no_more_jobs() {
     in_many_orders(|| {
         let count = Arc::new(AtomicUsize::new(0));
         let worker = || {

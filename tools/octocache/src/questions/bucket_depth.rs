@@ -11,10 +11,10 @@ use report::{Cell, Table};
 use voxtile::{InMemoryMapper, InsertMode, MapConfig, MapView, Mapper, Scan, VoxelCacheConfig};
 
 const TAUS: [usize; 5] = [1, 2, 4, 8, 16];
-/// The one that the paper takes: both series meet there.
+/// The value of the paper, where both series meet.
 const USUAL_TAU: usize = 4;
 
-/// A shape of the cache, and what was measured with it.
+/// A shape of the cache, and its measurements.
 struct Shape {
     is_constant_size: bool,
     cache: VoxelCacheConfig,
@@ -103,7 +103,7 @@ fn measure(setting: &Setting, dataset: &Dataset, resolution_m: f64) -> Result<Ve
             let build = Contender::Serial.build(&config, shape.cache, &scans)?;
             let counts = build.statistics.octrees.voxel_cache;
             let updates = (counts.hits + counts.misses).max(1) as f64;
-            shape.ns_per_update.push(build.took().cpu_s() * 1e9 / updates);
+            shape.ns_per_update.push(build.elapsed().cpu_s() * 1e9 / updates);
             shape.hit_rate = counts.hit_rate();
         }
     }

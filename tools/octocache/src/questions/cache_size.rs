@@ -1,4 +1,4 @@
-//! Figure 23: how many updates find their voxel in the cache, by its size.
+//! Figure 23: hit rate of the cache by its size.
 
 use crate::contender::Contender;
 use crate::dataset::in_one_tile;
@@ -48,7 +48,7 @@ pub fn answer(setting: &Setting) -> Result<Answer> {
                 Cell::Share(counts.hit_rate()),
                 Cell::Share(octrees.voxels_written as f64 / updates),
                 Cell::Share(cells as f64 / build.statistics.cached.octree_nodes.max(1) as f64),
-                Cell::Number(build.took().cpu_s() * 1e9 / updates, 0),
+                Cell::Number(build.elapsed().cpu_s() * 1e9 / updates, 0),
             ]);
             points.push([cells as f64, counts.hit_rate()]);
         }

@@ -1,4 +1,4 @@
-//! Figure 8 and table 2: how often the same voxels are updated, within a scan and from scan to scan.
+//! Figure 8 and table 2: repeated updates of voxels, within a scan and between scans.
 
 use crate::dataset::map_config;
 use crate::setting::Setting;
@@ -14,25 +14,25 @@ use voxtile::space::{BrickCode, BrickMask, TileIndex};
 use voxtile::{InsertMode, MapConfig, Scan};
 
 const RESOLUTIONS_M: [f64; 4] = [0.1, 0.2, 0.4, 0.8];
-/// The plot is at this one.
+/// Resolution of the plot.
 const PLOTTED_M: f64 = 0.2;
-/// Scans whose voxels a scan is compared with.
+/// Number of previous scans with which a scan is compared.
 const EARLIER_SCANS: usize = 3;
 
 /// A set of voxels, brick by brick.
 #[derive(Default)]
 struct VoxelSet(FxHashMap<(TileIndex, BrickCode), BrickMask>);
 
-/// What was counted of a data set at a resolution.
+/// Counts for a data set at a resolution.
 #[derive(Default)]
 struct Counts {
-    /// Updates if every ray counts.
+    /// Number of updates if every ray counts.
     updates: u64,
-    /// Distinct voxels of each scan, added up.
+    /// Sum of the distinct voxels of each scan.
     of_scans: u64,
     /// Distinct voxels of all scans.
     of_map: u64,
-    /// Share of a scan's voxels that one of the scans just before has too, from the fourth scan on.
+    /// Share of a scan's voxels that are in one of the [`EARLIER_SCANS`] before it, from the fourth scan on.
     overlaps: Samples,
 }
 
@@ -114,14 +114,14 @@ fn count(config: &MapConfig, scans: &[Scan]) -> Result<Counts> {
     Ok(counts)
 }
 
-/// The steps of the distribution of sorted samples.
+/// Steps of the distribution of sorted samples.
 fn distribution(sorted: &[f64]) -> Vec<[f64; 2]> {
     let share = |count: usize| count as f64 / sorted.len() as f64;
     sorted.iter().enumerate().flat_map(|(k, &x)| [[x, share(k)], [x, share(k + 1)]]).collect()
 }
 
 impl VoxelSet {
-    /// The voxels of a scan that updates each once.
+    /// The voxels of a scan with one update per voxel.
     fn of(updates: &ScanUpdates) -> Self {
         let mut set = Self::default();
         for (tile, updates) in &updates.tiles {
@@ -144,7 +144,7 @@ impl VoxelSet {
         }
     }
 
-    /// Voxels that any of the others has too.
+    /// Number of voxels that are in any of the others.
     fn count_common(&self, others: &VecDeque<Self>) -> u64 {
         let common = self.0.iter().map(|(brick, mask)| {
             let found = others.iter().filter_map(|other| other.0.get(brick));
@@ -168,7 +168,7 @@ mod tests {
     use std::path::Path;
 
     #[test]
-    fn counts_are_those_of_single_voxels() {
+    fn counts_match_a_count_of_single_voxels() {
         let config = map_config(0.4).unwrap();
         let scans = datasets(Path::new(""))[1].scans(4).unwrap();
         let counts = count(&config, &scans).unwrap();

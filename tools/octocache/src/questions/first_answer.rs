@@ -1,4 +1,4 @@
-//! From a scan to the first answer that knows it.
+//! Time from a scan to the first answer that includes it.
 
 use crate::contender::Contender;
 use crate::dataset::map_config;
@@ -15,13 +15,13 @@ use voxtile::{
     InMemoryMapper, InsertMode, MapConfig, MapQueries, MapView, Mapper, Occupancy, Scan, VoxelCacheConfig,
 };
 
-/// Depth of the nodes that are asked for: 8 x 8 x 8 voxels.
+/// Depth of the queried nodes: 8 x 8 x 8 voxels.
 const DEPTH: u8 = 13;
 const NODE_EDGE_VOXELS: i64 = 1 << (16 - DEPTH);
-/// Places that a plan looks at.
+/// Number of queried points.
 const PLACES: usize = 100;
 
-/// Milliseconds from handing in a scan, scan by scan.
+/// Times from the call of `insert_scan`, scan by scan, in milliseconds.
 #[derive(Default)]
 struct Times {
     inserted_ms: Samples,
@@ -89,21 +89,21 @@ fn panel(counting: &str, sets: &[(&str, [Times; 4])]) -> Panel {
     }
 }
 
-/// Lets the contenders map the scans in turn, scan by scan.
+/// Runs the contenders in turn, scan by scan.
 fn measure(config: &MapConfig, scans: &[Scan]) -> Result<[Times; 4]> {
     let mut times: [Times; 4] = Default::default();
     for (contender, times) in Contender::ALL.into_iter().zip(&mut times) {
         let mut mapper =
             InMemoryMapper::new(contender.configure(config.clone(), VoxelCacheConfig::default()))?;
         for scan in scans {
-            look(&mut mapper, scan, times)?;
+            measure_scan(&mut mapper, scan, times)?;
         }
     }
     Ok(times)
 }
 
-/// Hands in a scan, asks, and looks whether the answers are right.
-fn look(mapper: &mut InMemoryMapper, scan: &Scan, times: &mut Times) -> Result<()> {
+/// Inserts a scan, queries it, and checks the answers.
+fn measure_scan(mapper: &mut InMemoryMapper, scan: &Scan, times: &mut Times) -> Result<()> {
     let places = places(scan);
     let mut answers = Vec::with_capacity(places.len());
     let stopwatch = Stopwatch::start()?;
@@ -122,18 +122,18 @@ fn look(mapper: &mut InMemoryMapper, scan: &Scan, times: &mut Times) -> Result<(
     times.all_ms.push(all.wall_s * 1e3);
     for (place, answer) in places.into_iter().zip(answers) {
         let truth = truth(mapper, place)?;
-        ensure!(answer == truth, "{place:?} m: the octree says {answer:?}, the table {truth:?}");
+        ensure!(answer == truth, "{place:?} m: the octree has {answer:?}, the table {truth:?}");
     }
     Ok(())
 }
 
-/// Points of the scan, evenly chosen, of those that are mapped.
+/// Evenly chosen points of the scan.
 fn places(scan: &Scan) -> Vec<Point> {
     let step = scan.points.len().div_ceil(PLACES).max(1);
     scan.points.iter().step_by(step).copied().collect()
 }
 
-/// What the voxels of the node that holds a point say, looked at one by one.
+/// Occupancy of the node around a point, from its voxels one by one.
 fn truth(mapper: &InMemoryMapper, place: Point) -> Result<Occupancy> {
     let mut max: Option<f32> = None;
     if let Some(region) = node_at(&mapper.config().grid, place) {
@@ -145,7 +145,7 @@ fn truth(mapper: &InMemoryMapper, place: Point) -> Result<Occupancy> {
     Ok(Occupancy::of_log_odds(mapper.config(), max.map(f64::from)))
 }
 
-/// The node that holds a point; it holds the centers of its voxels and no others.
+/// Box of the node around a point; it contains the centers of exactly its voxels.
 fn node_at(grid: &Grid, place: Point) -> Option<Aabb> {
     let first =
         grid.voxel_of(place)?.map(|index| i64::from(index).div_euclid(NODE_EDGE_VOXELS) * NODE_EDGE_VOXELS);
@@ -161,7 +161,7 @@ mod tests {
     use std::path::Path;
 
     #[test]
-    fn the_truth_is_what_every_form_of_octree_says() {
+    fn all_forms_of_octree_agree_with_the_table() {
         let scans = datasets(Path::new(""))[1].scans(2).unwrap();
         let config = map_config(0.2).unwrap();
         for contender in Contender::ALL {
@@ -169,7 +169,7 @@ mod tests {
             let mut mapper = InMemoryMapper::new(config).unwrap();
             let mut times = Times::default();
             for scan in &scans {
-                look(&mut mapper, scan, &mut times).unwrap();
+                measure_scan(&mut mapper, scan, &mut times).unwrap();
                 assert!(places(scan).iter().any(|&place| truth(&mapper, place).unwrap().is_occupied()));
             }
             assert_eq!(truth(&mapper, [1e6; 3]).unwrap(), Occupancy::Unknown);

@@ -1,4 +1,4 @@
-//! The questions, one a file.
+//! The questions, one per file.
 
 mod bucket_depth;
 mod cache_size;
@@ -14,13 +14,13 @@ use report::Answer;
 
 /// A question of the paper.
 pub struct Question {
-    /// Its section in the page, and what `--only` takes.
+    /// Section of the page, and value of `--only`.
     pub name: &'static str,
-    /// Measures.
+    /// Measures the answer.
     pub answer: fn(&Setting) -> Result<Answer>,
 }
 
-/// All of them, in the order of the page.
+/// All questions, in the order of the page.
 pub const QUESTIONS: [Question; 8] = [
     Question { name: "update-order", answer: update_order::answer },
     Question { name: "duplicates", answer: duplicates::answer },

@@ -1,4 +1,4 @@
-//! Figure 22 and table 3: where the time goes.
+//! Figure 22 and table 3: times of the stages.
 
 use crate::contender::{Build, Contender};
 use crate::dataset::map_config;
@@ -11,7 +11,7 @@ use report::{Cell, Table};
 use voxtile::{InsertMode, VoxelCacheConfig};
 
 const OCTREE_UPDATE: &str = "octree update";
-/// Stages of the thread that maps, in the order in which they are stacked.
+/// Stages of the mapping thread, in the order of the stack.
 const STAGES: [&str; 8] = [
     "ray tracing",
     "table",
@@ -25,12 +25,12 @@ const STAGES: [&str; 8] = [
 /// Stages of the thread that writes trees.
 const WORKER_STAGES: [&str; 3] = ["octree update, thread 2", "out of the queue, thread 2", "idle, thread 2"];
 
-/// Milliseconds a scan in each stage, run by run.
+/// Milliseconds per scan in each stage, run by run.
 #[derive(Default)]
 struct Stages {
     own_ms: [Samples; 8],
     worker_ms: [Samples; 3],
-    /// Voxels written to the trees, a scan, and of these after the last scan.
+    /// Voxels written to the trees per scan, and the part after the last scan.
     written: [f64; 2],
 }
 
@@ -88,7 +88,7 @@ fn panel(title: &str, contenders: &[Contender], stages: &[Stages]) -> Panel {
     categories.push("thread 2".to_owned());
     let own = STAGES.iter().enumerate().map(|(stage, name)| {
         let mut values: Vec<f64> = stages.iter().map(|stages| stages.own_ms[stage].median()).collect();
-        // The same color in whichever thread.
+        // The update has the same color in both threads.
         let is_octree_update = *name == OCTREE_UPDATE;
         let of_worker = stages.last().map_or(0.0, |last| last.worker_ms[0].median());
         values.push(if is_octree_update { of_worker } else { 0.0 });
@@ -103,7 +103,7 @@ fn panel(title: &str, contenders: &[Contender], stages: &[Stages]) -> Panel {
 }
 
 impl Stages {
-    /// Adds a run of so many scans.
+    /// Adds a run over `scans` scans.
     fn push(&mut self, build: &Build, scans: f64) {
         let octrees = &build.inserted.octrees;
         let times = &octrees.times;
@@ -116,7 +116,7 @@ impl Stages {
             times.octree_update_ns - times.worker_update_ns,
         ]
         .map(|ns| ns as f64 / 1e6);
-        // What is left of the time is the rays, and their updates' way to the tiles.
+        // The remaining time is ray tracing and passing the updates to the tiles.
         let rays_ms = (build.inserting.wall_s * 1e3 - known.iter().sum::<f64>()).max(0.0);
         let own = [rays_ms].into_iter().chain(known).chain([build.draining.wall_s * 1e3]);
         self.own_ms.iter_mut().zip(own).for_each(|(samples, ms)| samples.push(ms / scans));

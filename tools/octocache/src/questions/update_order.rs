@@ -1,4 +1,4 @@
-//! Figure 10: the same updates to the octree in other orders.
+//! Figure 10: the same updates of the octree in different orders.
 
 use crate::dataset::{Dataset, map_config};
 use crate::setting::Setting;
@@ -18,7 +18,7 @@ use voxtile_simulation::Random;
 
 const RESOLUTION_M: f64 = 0.1;
 
-/// An order in which the same updates come.
+/// An order of updates.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Order {
     Original,
@@ -27,7 +27,7 @@ enum Order {
     Yzx,
     Zxy,
     Morton,
-    /// In Morton order and in one call.
+    /// Morton order, in one call.
     MortonAtOnce,
 }
 
@@ -41,7 +41,7 @@ const ORDERS: [(Order, &str); 7] = [
     (Order::MortonAtOnce, "Morton, one call"),
 ];
 
-/// An order's updates, and what was measured with it.
+/// The updates in one order, and their measurements.
 struct Contender {
     order: Order,
     updates: Vec<(MortonCode, f32)>,
@@ -75,7 +75,7 @@ pub fn answer(setting: &Setting) -> Result<Answer> {
     Ok(Answer { tables: vec![times, steps], plots: vec![Plot { file: "update_order", caption, panels }] })
 }
 
-/// A row with a value an order; orders that did not take part have none.
+/// A row with one value per order; orders without a measurement have none.
 fn row(
     set: &str,
     contenders: &[Contender],
@@ -110,7 +110,7 @@ fn panel(kind: &str, sets: &[(&str, Vec<Contender>)]) -> Panel {
     }
 }
 
-/// Lets all orders run in turn.
+/// Runs all orders in turn.
 fn measure(setting: &Setting, dataset: &Dataset, is_distinct: bool) -> Result<Vec<Contender>> {
     let config = map_config(RESOLUTION_M)?;
     let scans = dataset.scans(setting.size(40, 2))?;
@@ -122,7 +122,7 @@ fn measure(setting: &Setting, dataset: &Dataset, is_distinct: bool) -> Result<Ve
     Ok(contenders)
 }
 
-/// The same updates in all orders. Where every update counts, its value is the one that its voxel has by then.
+/// The same updates in all orders. If every update counts, its value is that of the voxel at that time.
 fn contenders(model: &SensorModel, stream: &[Update], is_distinct: bool) -> Vec<Contender> {
     let distinct = if is_distinct { last_values(&accumulated(model, stream)) } else { Vec::new() };
     let mut contenders = Vec::new();
@@ -130,7 +130,7 @@ fn contenders(model: &SensorModel, stream: &[Update], is_distinct: bool) -> Vec<
         let updates = if is_distinct {
             ordered(order, &distinct, |(code, _)| *code)
         } else if order == Order::MortonAtOnce {
-            // A call takes every voxel once.
+            // A call accepts each voxel only once.
             continue;
         } else {
             let stream = ordered(order, stream, |update| VoxelKey::from_index(update.voxel).morton());
@@ -141,7 +141,7 @@ fn contenders(model: &SensorModel, stream: &[Update], is_distinct: bool) -> Vec<
     contenders
 }
 
-/// Each voxel once, where it came first, with the value that came last.
+/// Each voxel once, at its first position, with its last value.
 fn last_values(updates: &[(MortonCode, f32)]) -> Vec<(MortonCode, f32)> {
     let last: rustc_hash::FxHashMap<MortonCode, f32> = updates.iter().copied().collect();
     let mut seen = FxHashSet::default();
@@ -171,7 +171,7 @@ fn ordered<T: Copy>(order: Order, items: &[T], code_of: impl Fn(&T) -> MortonCod
     items
 }
 
-/// Fisher and Yates.
+/// Fisher-Yates shuffle.
 fn shuffle<T>(items: &mut [T]) {
     let mut random = Random::of(1, &[items.len() as i64]);
     for last in (1..items.len()).rev() {
@@ -180,7 +180,7 @@ fn shuffle<T>(items: &mut [T]) {
 }
 
 impl Contender {
-    /// One run, into a tree of its own.
+    /// Runs once, with a new tree.
     fn run(&mut self) -> Result<()> {
         let mut octree = Octree::new();
         let stopwatch = Stopwatch::start()?;
@@ -196,7 +196,7 @@ impl Contender {
     }
 }
 
-/// The paper's F by the number of updates: steps in the tree from a voxel to the next, up and down.
+/// The paper's F divided by the number of updates: steps in the tree from a voxel to the next, up and down.
 fn mean_distance(updates: &[(MortonCode, f32)]) -> f64 {
     let steps = |(a, b): (MortonCode, MortonCode)| match (a.0 ^ b.0).checked_ilog2() {
         None => 0,
@@ -213,7 +213,7 @@ mod tests {
     use std::path::Path;
 
     #[test]
-    fn all_orders_hold_the_same_updates_and_distinct_ones_make_the_same_tree() {
+    fn all_orders_have_the_same_updates_and_distinct_ones_give_the_same_tree() {
         let config = map_config(0.4).unwrap();
         let scans = datasets(Path::new(""))[1].scans(1).unwrap();
         let stream = updates(&config.grid, &scans, 20_000);
@@ -230,7 +230,7 @@ mod tests {
     }
 
     #[test]
-    fn no_order_has_shorter_ways_than_mortons() {
+    fn morton_order_has_the_shortest_distances() {
         let config = map_config(0.4).unwrap();
         let stream = updates(&config.grid, &datasets(Path::new(""))[0].scans(1).unwrap(), 20_000);
         let contenders = contenders(&config.sensor_model, &stream, true);

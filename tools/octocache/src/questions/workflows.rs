@@ -1,4 +1,4 @@
-//! Figures 20 and 21: the time of a map's construction by resolution, with every form of octree.
+//! Figures 20 and 21: time to build a map by resolution, with every form of octree.
 
 use crate::contender::Contender;
 use crate::dataset::{Dataset, map_config};
@@ -13,22 +13,22 @@ use voxtile::{InsertMode, VoxelCacheConfig};
 /// One of the paper's two workflows.
 struct Workflow {
     insert_mode: InsertMode,
-    /// Data sets have this many times their `some_scans`.
+    /// Factor of the number of scans, `some_scans`, of each data set.
     scans: usize,
-    /// Names of the files, and what the plot shows.
+    /// Names of the files.
     files: [&'static str; 4],
     caption: &'static str,
 }
 
-/// What a contender took to build a map, run by run, in seconds.
+/// Times of a contender to build a map, run by run, in seconds.
 #[derive(Default)]
 struct Times {
     wall_s: Samples,
-    /// Of the thread that maps.
+    /// CPU time of the mapping thread.
     own_s: Samples,
-    /// Of the thread that writes trees.
+    /// CPU time of the thread that writes trees.
     others_s: Samples,
-    /// Wall time of bringing the trees up to date after the last scan.
+    /// Wall time of updating the trees after the last scan.
     draining_s: Samples,
 }
 
@@ -47,7 +47,7 @@ pub fn every_ray(setting: &Setting) -> Result<Answer> {
     answer(setting, &Workflow { insert_mode: InsertMode::PerRay, scans: 1, files, caption })
 }
 
-/// Duplicates are gone before the octree sees the updates: the paper's OctoMap-RT.
+/// Duplicates are removed before the octree is updated: the paper's OctoMap-RT.
 pub fn once_a_scan(setting: &Setting) -> Result<Answer> {
     let files = ["once_a_scan_wall", "once_a_scan_cpu", "once_a_scan_seconds", "once_a_scan"];
     let caption = "Time to build a map where a voxel counts once a scan, by resolution";
@@ -77,7 +77,7 @@ fn answer(setting: &Setting, workflow: &Workflow) -> Result<Answer> {
     Ok(Answer { tables, plots: vec![plot] })
 }
 
-/// Lets the contenders build in turn.
+/// Runs the contenders in turn.
 fn measure(setting: &Setting, workflow: &Workflow, dataset: &Dataset, resolution_m: f64) -> Result<Measured> {
     let scans = dataset.scans(setting.size(dataset.some_scans * workflow.scans, 1))?;
     let config = map_config(resolution_m)?.with_insert_mode(workflow.insert_mode);
@@ -85,7 +85,7 @@ fn measure(setting: &Setting, workflow: &Workflow, dataset: &Dataset, resolution
     for _ in 0..setting.runs {
         for (contender, times) in Contender::ALL.into_iter().zip(&mut times) {
             let build = contender.build(&config, VoxelCacheConfig::default(), &scans)?;
-            let took = build.took();
+            let took = build.elapsed();
             times.wall_s.push(took.wall_s);
             times.own_s.push(took.own_s);
             times.others_s.push(took.others_s);
@@ -95,7 +95,7 @@ fn measure(setting: &Setting, workflow: &Workflow, dataset: &Dataset, resolution
     Ok(Measured { set: dataset.name, resolution_m, scans: scans.len(), times })
 }
 
-/// How many times as fast as without a cache, a line a set and contender.
+/// Speed relative to that without a cache, one row per set and contender.
 fn ratios(
     file: &'static str,
     caption: &str,

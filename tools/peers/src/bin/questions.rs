@@ -1,12 +1,12 @@
-//! What questions to a map in memory take: CPU time on one thread, scans of a folder or of a made-up survey.
+//! Times queries of a map in memory: CPU time on one thread, with scans of a folder or of a synthetic survey.
 //!
 //! ```text
 //! RAYON_NUM_THREADS=1 questions FOLDER|SURVEY RESOLUTION_M SCANS
 //! ```
 //!
-//! Questions are asked from where the sensor was, so that the ways of rays are as on a robot. Prints microseconds a
-//! question as JSON, and how many were hit, which must not change from one version to the next. `point` throws away the
-//! answer, so that its probability need not be computed; `point_kept` and `point_of_array` end with a list of answers.
+//! Queries start at positions of the sensor, so that rays are like those of a robot. Prints microseconds per query as
+//! JSON, and the number of hits, which must be equal in all versions. `point` discards the answer, so that its
+//! probability need not be computed; `point_kept` and `point_of_array` return a list of answers.
 
 use anyhow::{Context, Result, bail};
 use clap::ValueEnum;
@@ -26,9 +26,9 @@ const MAX_RANGE_M: f64 = 60.0;
 const RAYS: usize = 20_000;
 const POINTS: usize = 1_000_000;
 const NEAREST: usize = 20_000;
-/// How far from a sensor points, nearest voxels and bodies are asked for, in metres.
+/// Distance from a sensor within which points, nearest voxels and bodies are queried, in metres.
 const AROUND_M: f64 = 20.0;
-/// What is near a place, in metres.
+/// Distance of a near voxel, in metres.
 const NEAR_M: f64 = 1.0;
 
 fn main() -> Result<()> {
@@ -88,11 +88,12 @@ fn main() -> Result<()> {
     note(&mut answers, "nearest_within_10_m", NEAREST, || {
         places.iter().map(|&place| Ok(u64::from(map.nearest_occupied(place, 10.0)?.is_some()))).sum()
     })?;
-    let beside = |place: &Point| -> Result<bool> { Ok(map.nearest_occupied(*place, NEAR_M)?.is_some()) };
-    let places_beside: Vec<Point> =
-        places.iter().copied().filter(|place| beside(place).unwrap_or(false)).collect();
-    note(&mut answers, "nearest_where_one_is_near", places_beside.len(), || {
-        places_beside.iter().map(|&place| Ok(u64::from(map.nearest_occupied(place, 10.0)?.is_some()))).sum()
+    let is_near_occupied =
+        |place: &Point| -> Result<bool> { Ok(map.nearest_occupied(*place, NEAR_M)?.is_some()) };
+    let near_places: Vec<Point> =
+        places.iter().copied().filter(|place| is_near_occupied(place).unwrap_or(false)).collect();
+    note(&mut answers, "nearest_where_one_is_near", near_places.len(), || {
+        near_places.iter().map(|&place| Ok(u64::from(map.nearest_occupied(place, 10.0)?.is_some()))).sum()
     })?;
     note(&mut answers, "collision_of_a_sphere", NEAREST, || {
         let body = |center| Shape::Sphere { center, radius_m: 0.5 };
@@ -130,11 +131,11 @@ fn note(
     answers: &mut serde_json::Map<String, serde_json::Value>,
     name: &str,
     count: usize,
-    ask: impl Fn() -> Result<u64>,
+    query: impl Fn() -> Result<u64>,
 ) -> Result<()> {
-    black_box(ask()?);
+    black_box(query()?);
     let watch = Stopwatch::start()?;
-    let hits = black_box(ask()?);
+    let hits = black_box(query()?);
     let micros = 1e6 * watch.stop()?.cpu_s() / count as f64;
     answers.insert(name.to_owned(), serde_json::json!({ "us": (1e3 * micros).round() / 1e3, "hits": hits }));
     Ok(())

@@ -1,6 +1,6 @@
-//! voxtile's side of the comparison: does one thing with a stream of scans and prints one line of JSON.
+//! voxtile's side of the comparison: does one task with a stream of scans and prints one line of JSON.
 //!
-//! The stream is read into memory first, and nothing but what is named is timed.
+//! Reads the whole stream into memory, and times only the named task.
 
 use anyhow::{Context, Result, bail};
 use clap::{Args, Parser, Subcommand};
@@ -22,10 +22,10 @@ use voxtile_simulation::Random;
 use workload::ScanReader;
 
 const TILE_SIZE_M: f64 = 10.0;
-/// More than any of the workloads has, so that nothing is evicted.
+/// Larger than the number of tiles of any workload, so that none is evicted.
 const CACHE_TILES: usize = 1 << 20;
 
-/// voxtile's side of the comparison; lengths in metres, times in seconds.
+/// Run one task of the comparison with voxtile
 #[derive(Debug, Parser)]
 #[command(name = "voxtile_contender")]
 struct Arguments {
@@ -35,24 +35,23 @@ struct Arguments {
 
 #[derive(Debug, Subcommand)]
 enum Task {
-    /// Time the insertion of all scans into an empty map, and what else is asked for
+    /// Time the insertion of all scans into an empty map, with the selected steps
     Build(BuildArguments),
-    /// Weigh the map of all scans
+    /// Measure the memory of the map of all scans
     Memory(MapArguments),
-    /// Write points to ask for: N anywhere in the bounding box of the known voxels, N centers of known voxels
+    /// Write points to query: N anywhere in the bounding box of the known voxels, N centers of known voxels
     WritePoints(WritePointsArguments),
-    /// Time the questions for points, one by one
+    /// Time point queries, one by one
     Questions(QuestionsArguments),
     /// Write every known voxel to a file
     Dump(DumpArguments),
 }
 
-/// Which map.
 #[derive(Debug, Args)]
 struct MapArguments {
     /// The stream of scans
     stream: PathBuf,
-    /// Take no more than the first N scans
+    /// Use at most the first N scans
     #[arg(long, value_name = "N")]
     scans: Option<usize>,
     /// Edge of a voxel in metres
@@ -61,10 +60,10 @@ struct MapArguments {
     /// Cut rays at this range in metres [default: no limit]
     #[arg(long, value_name = "M")]
     max_range: Option<f64>,
-    /// Let every ray count, not every scan
+    /// Update a voxel for each ray instead of once a scan
     #[arg(long)]
     per_ray: bool,
-    /// Take intensity-weighted log-odds, with the intensities of this file
+    /// Use intensity-weighted log-odds, with the intensities from this file
     #[arg(long, value_name = "FILE")]
     intensities: Option<PathBuf>,
 }
@@ -73,16 +72,16 @@ struct MapArguments {
 struct BuildArguments {
     #[command(flatten)]
     map: MapArguments,
-    /// Hand in the scans together, not one by one
+    /// Insert all scans in one call instead of one by one
     #[arg(long)]
     together: bool,
-    /// Bring the octrees up to date after every scan
+    /// Update the octrees after every scan
     #[arg(long)]
     sync: bool,
     /// Build out of core, in new folders below this one, and flush
     #[arg(long, value_name = "FOLDER", conflicts_with = "sync")]
     folder: Option<PathBuf>,
-    /// Build again until so many seconds were timed
+    /// Repeat the build until this many seconds are measured
     #[arg(long, value_name = "S", default_value_t = 0.5)]
     least_seconds: f64,
 }
@@ -93,7 +92,7 @@ struct WritePointsArguments {
     map: MapArguments,
     #[command(flatten)]
     points: PointFiles,
-    /// Points a file
+    /// Number of points per file
     #[arg(long, value_name = "N")]
     count: usize,
 }
@@ -104,7 +103,7 @@ struct QuestionsArguments {
     map: MapArguments,
     #[command(flatten)]
     points: PointFiles,
-    /// Ask again until so many seconds were timed
+    /// Repeat the queries until this many seconds are measured
     #[arg(long, value_name = "S", default_value_t = 0.5)]
     least_seconds: f64,
 }
@@ -123,7 +122,7 @@ struct PointFiles {
 struct DumpArguments {
     #[command(flatten)]
     map: MapArguments,
-    /// File of the voxels
+    /// Output file
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
 }
@@ -156,7 +155,7 @@ fn build(arguments: &BuildArguments) -> Result<()> {
             let mut mapper = OutOfCoreTileMapper::create(&folder, config.clone())?;
             insert(&mut mapper, &scans, arguments.together)?;
             mapper.flush()?;
-            // The map stays: a file system may take its time for files soon after others were removed.
+            // Keeps the map: a file system may be slow soon after many files were removed.
             stopwatch.stop()?
         } else {
             let mut mapper = InMemoryMapper::new(config.clone())?;
@@ -168,7 +167,7 @@ fn build(arguments: &BuildArguments) -> Result<()> {
             } else {
                 insert(&mut mapper, &scans, arguments.together)?;
             }
-            // The map is dropped after the clocks were read.
+            // The map is dropped after the measurement.
             stopwatch.stop()?
         };
         cpu += took.cpu;
@@ -212,7 +211,7 @@ fn write_points(arguments: &WritePointsArguments) -> Result<()> {
     }
     let voxels = mapper.statistics().cached.voxels;
     if voxels == 0 {
-        bail!("{}: the map of these scans knows no voxel", arguments.map.stream.display());
+        bail!("{}: the map of these scans is empty", arguments.map.stream.display());
     }
     let grid = &mapper.config().grid;
     let (low_m, high_m) = (grid.center_m(low), grid.center_m(high));
@@ -221,7 +220,7 @@ fn write_points(arguments: &WritePointsArguments) -> Result<()> {
         .collect::<Vec<_>>();
     peers::write_points(&arguments.points.anywhere, &anywhere)?;
 
-    // Each draw is the number of a voxel in the map's order; one pass finds them all.
+    // Each draw is the number of a voxel in the map's order; one pass finds all of them.
     let mut draws: Vec<(u64, usize)> =
         (0..arguments.count).map(|place| (random.below(voxels), place)).collect();
     draws.sort_unstable();
@@ -245,7 +244,7 @@ fn questions(arguments: &QuestionsArguments) -> Result<()> {
     let answers = |file: &Path| -> Result<Answers> {
         let points: Vec<Point> =
             peers::read_points(file)?.into_iter().map(|point| point.map(f64::from)).collect();
-        let (mut asked, mut cpu) = (0_usize, Duration::ZERO);
+        let (mut queried, mut cpu) = (0_usize, Duration::ZERO);
         loop {
             let (mut known, mut occupied) = (0, 0);
             let stopwatch = Stopwatch::start()?;
@@ -257,9 +256,9 @@ fn questions(arguments: &QuestionsArguments) -> Result<()> {
                 }
             }
             cpu += stopwatch.stop()?.cpu;
-            asked += points.len();
+            queried += points.len();
             if cpu.as_secs_f64() >= arguments.least_seconds || points.is_empty() {
-                let ns = cpu.as_secs_f64() * 1e9 / asked.max(1) as f64;
+                let ns = cpu.as_secs_f64() * 1e9 / queried.max(1) as f64;
                 return Ok(Answers { ns, known, occupied });
             }
         }
@@ -309,7 +308,7 @@ impl MapArguments {
             .with_context(|| format!("{}: cannot read", self.stream.display()))
     }
 
-    /// The map of all scans.
+    /// Builds the map of all scans.
     fn mapper(&self) -> Result<InMemoryMapper> {
         let mut mapper = InMemoryMapper::new(self.config()?)?;
         insert(&mut mapper, &self.scans()?, false)?;
@@ -325,13 +324,13 @@ fn insert(mapper: &mut impl Mapper, scans: &[Scan], are_together: bool) -> voxti
     scans.iter().try_for_each(|scan| mapper.insert_scan(scan).map(drop))
 }
 
-/// The two clocks: of the process, all threads together, and on the wall.
+/// CPU time of the process (all threads) and wall time.
 struct Stopwatch {
     cpu: Duration,
     wall: Instant,
 }
 
-struct Took {
+struct Elapsed {
     cpu: Duration,
     wall: Duration,
 }
@@ -341,9 +340,9 @@ impl Stopwatch {
         Ok(Self { cpu: process_cpu_time()?, wall: Instant::now() })
     }
 
-    fn stop(&self) -> Result<Took> {
+    fn stop(&self) -> Result<Elapsed> {
         let wall = self.wall.elapsed();
-        Ok(Took { cpu: process_cpu_time()?.saturating_sub(self.cpu), wall })
+        Ok(Elapsed { cpu: process_cpu_time()?.saturating_sub(self.cpu), wall })
     }
 }
 
@@ -352,7 +351,7 @@ fn process_cpu_time() -> Result<Duration> {
         .context("the CPU clock is not a length of time")
 }
 
-/// Bytes of memory that the process holds, as Linux tells.
+/// Resident memory of the process in bytes, from Linux.
 fn resident_bytes() -> Result<u64> {
     let path = "/proc/self/status";
     let status = fs::read_to_string(path).with_context(|| format!("{path}: cannot read"))?;

@@ -1,32 +1,32 @@
 use plotters::coord::ranged1d::{KeyPointHint, NoDefaultFormatting, Ranged, ValueFormatter};
 use std::ops::Range;
 
-/// How an axis spreads its values.
+/// Scale of an axis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Scale {
-    /// Evenly.
+    /// Linear.
     Linear,
-    /// By their logarithm; values of 0 and less have no place on it.
+    /// Logarithmic; values of 0 and less are not shown.
     Log,
 }
 
-/// An axis for given values: its ends, and where it has ticks.
+/// An axis for given values: its ends and ticks.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Axis {
     scale: Scale,
     ends: [f64; 2],
     ticks: Vec<f64>,
-    /// What stands at the ticks 0, 1, 2 and so on instead of numbers.
+    /// Labels of the ticks 0, 1, 2 and so on instead of numbers.
     categories: Vec<String>,
 }
 
-/// Ticks that an axis has at most, more or less.
+/// Approximate maximum number of ticks.
 const TICKS: f64 = 6.0;
-/// Room beyond the values, as a share of the axis.
+/// Margin beyond the values, as a share of the axis.
 const MARGIN: f64 = 0.04;
 
 impl Axis {
-    /// An axis that shows all of these values; `from_zero` starts a linear one at 0.
+    /// Creates an axis that shows all of these values; `from_zero` starts a linear one at 0.
     pub fn of(scale: Scale, values: impl Iterator<Item = f64>, from_zero: bool) -> Self {
         let values = values.filter(|value| value.is_finite() && (scale == Scale::Linear || *value > 0.0));
         let (mut least, mut most) =
@@ -53,23 +53,23 @@ impl Axis {
         Self { scale, ends, ticks, categories: Vec::new() }
     }
 
-    /// An axis of categories, at the values 0, 1, 2 and so on.
+    /// Creates an axis of categories, at the values 0, 1, 2 and so on.
     pub fn of_categories(categories: Vec<String>) -> Self {
         let ticks = (0..categories.len()).map(|k| k as f64).collect();
         Self { scale: Scale::Linear, ends: [-0.6, categories.len() as f64 - 0.4], ticks, categories }
     }
 
-    /// Whether a value has a place on the axis.
+    /// Returns whether the axis can show a value.
     pub fn shows(&self, value: f64) -> bool {
         value.is_finite() && (self.scale == Scale::Linear || value > 0.0)
     }
 
-    /// What stands at a tick.
+    /// Label of a tick.
     pub fn label(&self, value: f64) -> String {
         self.categories.get(value.round() as usize).cloned().unwrap_or_else(|| readable(value))
     }
 
-    /// 0 to 1 from one end to the other.
+    /// Position of a value, 0 to 1 from one end to the other.
     fn share(&self, value: f64) -> f64 {
         let [place, first, last] = [value, self.ends[0], self.ends[1]].map(|value| match self.scale {
             Scale::Linear => value,
@@ -112,7 +112,7 @@ fn linear_ticks(least: f64, most: f64) -> Vec<f64> {
     (first..=last).map(|k| k as f64 * step).collect()
 }
 
-/// 1, 2 and 5 times powers of ten where these are few, else powers of ten.
+/// Powers of ten; also 2 and 5 times them if the range is small.
 fn log_ticks(least: f64, most: f64) -> Vec<f64> {
     let decades = least.log10().floor() as i32..=most.log10().ceil() as i32;
     let steps: &[f64] = if (most / least).log10() < TICKS / 2.0 { &[1.0, 2.0, 5.0] } else { &[1.0] };
@@ -120,7 +120,7 @@ fn log_ticks(least: f64, most: f64) -> Vec<f64> {
     ticks.filter(|tick| (least * 0.999..=most * 1.001).contains(tick)).collect()
 }
 
-/// A tick's number without the noise of its computation, thousands as k and millions as M.
+/// Formats a tick without rounding noise, thousands as k and millions as M.
 fn readable(value: f64) -> String {
     let (value, unit) = match value.abs() {
         x if x >= 999_999.5 => (value / 1e6, " M"),
@@ -152,7 +152,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_and_one_value_have_an_axis_too() {
+    fn an_axis_needs_no_values() {
         for scale in [Scale::Linear, Scale::Log] {
             for values in [vec![], vec![7.0], vec![0.0], vec![f64::NAN]] {
                 let axis = Axis::of(scale, values.iter().copied(), false);
@@ -163,7 +163,7 @@ mod tests {
     }
 
     #[test]
-    fn equal_factors_are_equally_long_on_a_logarithmic_axis() {
+    fn equal_factors_have_equal_lengths_on_a_logarithmic_axis() {
         let axis = Axis::of(Scale::Log, [1.0, 100.0].into_iter(), false);
         let [a, b, c] = [1.0, 10.0, 100.0].map(|value| axis.map(&value, (1000, 0)));
         assert!(a > b && b > c && (a - b - (b - c)).abs() <= 1);

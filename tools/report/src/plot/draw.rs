@@ -6,13 +6,13 @@ use plotters::prelude::*;
 use std::fs;
 use std::path::Path;
 
-/// Panels side by side and a legend for all of them, one SVG file.
+/// Panels side by side with a common legend, in one SVG file.
 pub struct Plot {
-    /// Name of the file, without its ending.
+    /// Name of the file, without extension.
     pub file: &'static str,
-    /// What it shows, in one sentence.
+    /// Caption, one sentence.
     pub caption: String,
-    /// The coordinate systems, in the order of reading.
+    /// The panels, in reading order.
     pub panels: Vec<Panel>,
 }
 
@@ -22,7 +22,7 @@ type Chart<'a, 'b> = ChartContext<'a, SVGBackend<'b>, Cartesian2d<Axis, Axis>>;
 const PANEL_PIXELS: (u32, u32) = (380, 290);
 const LEGEND_PIXELS: u32 = 30;
 const MAX_PANELS_A_ROW: usize = 3;
-/// Colors that those who do not tell red from green tell apart (Okabe and Ito).
+/// Colors that are distinguishable with red-green blindness (Okabe and Ito).
 const COLORS: [RGBColor; 8] = [
     RGBColor(213, 94, 0),
     RGBColor(0, 114, 178),
@@ -64,7 +64,7 @@ impl Plot {
         Ok(svg)
     }
 
-    /// The names of all panels, each once, in the order in which they come.
+    /// The names of all panels, each once, in order.
     fn names(&self) -> Vec<&str> {
         let mut names = Vec::new();
         for name in self.panels.iter().flat_map(|panel| panel.content.names()) {
@@ -125,7 +125,7 @@ impl Plot {
         let points = line.points.iter().map(|[a, b]| (*a, *b));
         let points: Vec<(f64, f64)> = points.filter(|(a, b)| x.shows(*a) && y.shows(*b)).collect();
         chart.draw_series(LineSeries::new(points.iter().copied(), color.stroke_width(2)))?;
-        // Steps of a distribution need no dots.
+        // Long lines are distributions, whose steps need no dots.
         if points.len() <= 20 {
             chart.draw_series(points.iter().map(|&point| Circle::new(point, 3, color.filled())))?;
         }
@@ -142,7 +142,7 @@ impl Plot {
     }
 }
 
-/// Room for a name in the legend; wide enough for most letters, for without fonts nobody knows the width of a word.
+/// Width of a legend entry. An estimate that fits most letters: text widths need fonts.
 fn entry_pixels(name: &str) -> i32 {
     40 + 7 * name.chars().count() as i32
 }
@@ -153,7 +153,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_plot_shows_its_titles_ticks_and_names() {
+    fn a_plot_has_its_titles_ticks_and_names() {
         let lines = vec![Line {
             name: "serial & co".to_owned(),
             points: vec![[1.0, 10.0], [8.0, f64::NAN], [16.0, 80.0]],

@@ -1,4 +1,4 @@
-//! Plots as SVG files: panels side by side, of lines or of bars.
+//! Plots as SVG files: panels side by side, with lines or bars.
 
 mod axis;
 mod draw;

@@ -2,23 +2,23 @@ use super::axis::{Axis, Scale};
 
 /// One coordinate system of a plot.
 pub struct Panel {
-    /// What stands above it.
+    /// Title above it.
     pub title: String,
-    /// What the horizontal axis shows.
+    /// Label of the horizontal axis.
     pub x_label: String,
-    /// What the vertical axis shows.
+    /// Label of the vertical axis.
     pub y_label: String,
-    /// What is drawn.
+    /// Lines or bars.
     pub content: Content,
 }
 
-/// What is drawn.
+/// Content of a panel.
 pub enum Content {
     /// Lines through points.
     Lines {
-        /// Of the horizontal axis.
+        /// Scale of the horizontal axis.
         x_scale: Scale,
-        /// Of the vertical axis.
+        /// Scale of the vertical axis.
         y_scale: Scale,
         /// The lines.
         lines: Vec<Line>,
@@ -29,23 +29,23 @@ pub enum Content {
 
 /// A line through points.
 pub struct Line {
-    /// What the legend calls it; the same name has the same color in all panels.
+    /// Name in the legend; the same name has the same color in all panels.
     pub name: String,
-    /// The points, in the order in which they are joined; those that are not finite are left out.
+    /// The points, in the order in which they are joined; points that are not finite are left out.
     pub points: Vec<[f64; 2]>,
 }
 
 /// Bars, from 0 up.
 pub struct Bars {
-    /// What stands below the bars.
+    /// Labels below the bars.
     pub categories: Vec<String>,
-    /// The names in the legend, and a value a category.
+    /// Names in the legend, each with a value per category.
     pub series: Vec<(String, Vec<f64>)>,
-    /// Whether the bars of a category stand on each other, not side by side.
+    /// Whether the bars of a category are stacked instead of side by side.
     pub are_stacked: bool,
 }
 
-/// Part of the room of a category that its bars fill.
+/// Share of a category's width that its bars fill.
 const FILLED: f64 = 0.8;
 
 impl Content {
@@ -74,7 +74,7 @@ impl Content {
 }
 
 impl Bars {
-    /// The bars: number of the series, and two opposite corners. Values that are not finite have none.
+    /// The bars: number of the series, and two opposite corners. Values that are not finite have no bar.
     pub fn rectangles(&self) -> Vec<(usize, [[f64; 2]; 2])> {
         let mut rectangles = Vec::new();
         for category in 0..self.categories.len() {
@@ -107,7 +107,7 @@ mod tests {
     }
 
     #[test]
-    fn bars_stand_side_by_side_or_on_each_other() {
+    fn bars_are_side_by_side_or_stacked() {
         let side_by_side =
             [(0, [[-0.4, 0.0], [0.0, 1.0]]), (1, [[0.0, 0.0], [0.4, 2.0]]), (1, [[1.0, 0.0], [1.4, 4.0]])];
         assert_eq!(bars(false).rectangles(), side_by_side);

@@ -5,14 +5,14 @@ use crate::random_scans::Random;
 pub(super) struct Content {
     pub(super) seen: Vec<u8>,
     pub(super) on_medium: Vec<u8>,
-    /// Whether `seen` counts as synced although it never came to the medium.
+    /// Whether `seen` counts as synced although it never reached the medium.
     pub(super) lost: bool,
     pub(super) readers: usize,
     pub(super) locked: bool,
 }
 
 impl Content {
-    /// Blocks of what was written and not synced, some there and some not, up to a length that is there or not.
+    /// Content after a crash: a random mix of old and unsynced blocks, of the old or the new length.
     pub(super) fn mixed(&self, random: &mut Random) -> Vec<u8> {
         const BLOCK: usize = 512;
         let (old, new) = (&self.on_medium, &self.seen);

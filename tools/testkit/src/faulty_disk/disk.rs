@@ -9,17 +9,17 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard};
 use voxtile::store::Disk;
 
-/// A disk in memory that fails or loses power at the operation it is told to.
+/// A disk in memory that fails or loses power at a chosen operation.
 ///
-/// It keeps what programs see apart from what is on the medium. A file's content gets there by a sync of the file, a
-/// name by a sync of its folder; a rename gets there as a whole or not at all.
+/// It separates what programs see from what is on the medium. The content of a file reaches the medium by a sync of the
+/// file, a name by a sync of its folder. A rename reaches it completely or not at all.
 #[derive(Clone, Debug)]
 pub struct FaultyDisk {
     state: Arc<Mutex<State>>,
 }
 
 impl FaultyDisk {
-    /// An empty disk with a folder `/`.
+    /// Creates an empty disk with the folder `/`.
     pub fn new(fault: Fault) -> Self {
         let names = Names::from([(PathBuf::from("/"), Entry::Folder)]);
         Self::of(names, HashMap::new(), fault)
@@ -34,12 +34,12 @@ impl FaultyDisk {
             unsynced_names: Vec::new(),
             next_inode,
             fault,
-            stays: matches!(fault, Fault::Breaks(_)),
+            had_permanent_fault: matches!(fault, Fault::Breaks(_)),
             operations: 0,
             changes: 0,
             renames: 0,
             refused_names: BTreeSet::new(),
-            has_room: true,
+            has_space: true,
             has_links: true,
             crashed: false,
             broken: BTreeSet::new(),
@@ -50,7 +50,7 @@ impl FaultyDisk {
         Self { state: Arc::new(Mutex::new(state)) }
     }
 
-    /// As the mapper takes it.
+    /// Returns the disk as a mapper needs it.
     pub fn shared(&self) -> Arc<dyn Disk> {
         Arc::new(self.clone())
     }
@@ -60,7 +60,7 @@ impl FaultyDisk {
         self.state().operations
     }
 
-    /// Number of operations so far that change something.
+    /// Number of operations so far that change the disk.
     pub fn changes(&self) -> u64 {
         self.state().changes
     }
@@ -70,31 +70,31 @@ impl FaultyDisk {
         self.state().renames
     }
 
-    /// How often a file was opened to be read from its beginning.
+    /// Number of times that a file was opened for reading from its beginning.
     pub fn times_opened(&self, path: &Path) -> u64 {
         self.state().opened.get(path).copied().unwrap_or_default()
     }
 
-    /// Lets something happen once, before the next lock is taken: what another process does meanwhile.
+    /// Calls `happens` once, before the next lock is taken, like a concurrent process.
     pub fn before_lock(&self, happens: impl FnOnce() + Send + 'static) {
         self.state().before_lock = Some(BeforeLock(Box::new(happens)));
     }
 
-    /// Whether the power has gone.
+    /// Returns whether the power has failed.
     pub fn has_crashed(&self) -> bool {
         self.state().crashed
     }
 
-    /// The same disk with a file system on which a file has one name only.
+    /// Returns the same disk without support for hard links.
     pub fn without_links(self) -> Self {
         self.state().has_links = false;
         self
     }
 
-    /// Ends a lack of room, or puts a good disk with the same bytes in place of one that refuses.
+    /// Ends a lack of space, or replaces a failing disk by a good one with the same bytes.
     pub fn make_room(&self) {
         let mut state = self.state();
-        (state.has_room, state.fault) = (true, Fault::None);
+        (state.has_space, state.fault) = (true, Fault::None);
         state.broken.clear();
         state.refused_names.clear();
     }
@@ -104,22 +104,22 @@ impl FaultyDisk {
         self.state().broken.insert(path.to_owned());
     }
 
-    /// Makes the content of a file one that cannot be read; it can be renamed, replaced and removed.
+    /// Makes the content of a file unreadable; the file can still be renamed, replaced and removed.
     pub fn make_unreadable(&self, path: &Path) {
         self.make_bytes_unreadable(path, 0..usize::MAX);
     }
 
-    /// Does so with some bytes of a file: a bad sector.
+    /// Makes some bytes of a file unreadable, like a bad sector.
     pub fn make_bytes_unreadable(&self, path: &Path, bytes: Range<usize>) {
         self.state().unreadable.insert(path.to_owned(), bytes);
     }
 
-    /// The file or folder that [`Fault::Breaks`] has hit.
+    /// The file or folder that [`Fault::Breaks`] has broken.
     pub fn broken(&self) -> Option<PathBuf> {
         self.state().broken.first().cloned()
     }
 
-    /// Ends what [`Fault::Breaks`], [`FaultyDisk::break_path`] and [`FaultyDisk::make_unreadable`] began.
+    /// Undoes [`Fault::Breaks`], [`FaultyDisk::break_path`] and [`FaultyDisk::make_unreadable`].
     pub fn mend(&self) {
         let mut state = self.state();
         state.broken.clear();
@@ -128,19 +128,19 @@ impl FaultyDisk {
         state.fault = Fault::None;
     }
 
-    /// Whether the disk has had a fault that stays.
-    pub fn had_a_fault_that_stays(&self) -> bool {
-        self.state().stays
+    /// Returns whether the disk has had a permanent fault.
+    pub fn had_permanent_fault(&self) -> bool {
+        self.state().had_permanent_fault
     }
 
-    /// What fails from now on; operations are counted anew.
+    /// Sets the fault, and resets the counters of operations.
     pub fn set_fault(&self, fault: Fault) {
         let mut state = self.state();
         (state.fault, state.operations, state.changes, state.renames) = (fault, 0, 0, 0);
-        state.stays |= matches!(fault, Fault::Breaks(_));
+        state.had_permanent_fault |= matches!(fault, Fault::Breaks(_));
     }
 
-    /// The disk as it is found when the power is back.
+    /// The disk after a power failure and restart.
     pub fn after_crash(&self, unsynced: Unsynced) -> Self {
         let state = self.state();
         let mut names = state.names_on_medium.clone();
@@ -165,7 +165,7 @@ impl FaultyDisk {
             let content = &state.contents[&inode];
             let bytes = match unsynced {
                 Unsynced::Dropped => content.on_medium.clone(),
-                // After a kill the page cache is still there.
+                // After a kill, the page cache is intact.
                 Unsynced::Kept => content.seen.clone(),
                 Unsynced::Shuffled(_) => content.mixed(&mut random),
             };
@@ -177,13 +177,13 @@ impl FaultyDisk {
         left
     }
 
-    /// The same disk for another process, after the one before was killed: nothing is lost, and nothing more is on the
+    /// The disk as another process sees it after a kill of this one: nothing is lost, and nothing more is on the
     /// medium.
     pub fn after_kill(&self) -> Self {
         let state = self.state();
         let mut disk = Self::of(state.names.clone(), state.contents.clone(), Fault::None);
         let next =
-            Arc::get_mut(&mut disk.state).expect("nobody else has it").get_mut().expect("no panic yet");
+            Arc::get_mut(&mut disk.state).expect("it is not shared yet").get_mut().expect("no panic yet");
         next.names_on_medium = state.names_on_medium.clone();
         next.unsynced_names = state.unsynced_names.clone();
         next.next_inode = state.next_inode;
@@ -194,12 +194,12 @@ impl FaultyDisk {
         disk
     }
 
-    /// A copy with everything on the medium that programs see.
+    /// A copy, with everything on the medium that programs see.
     pub fn copy(&self) -> Self {
         self.after_crash(Unsynced::Kept)
     }
 
-    /// Every file and its bytes, in order.
+    /// All files with their bytes, in order.
     pub fn files(&self) -> BTreeMap<PathBuf, Vec<u8>> {
         let state = self.state();
         let files = state.names.iter().filter_map(|(path, entry)| match entry {
@@ -209,7 +209,7 @@ impl FaultyDisk {
         files.collect()
     }
 
-    /// Puts a file in place, on the medium at once; its folder must exist.
+    /// Writes a file, at once on the medium; its folder must exist.
     pub fn put(&self, path: &Path, bytes: &[u8]) {
         let mut state = self.state();
         let inode = state.new_inode();
@@ -219,7 +219,7 @@ impl FaultyDisk {
         state.names_on_medium.insert(path.to_owned(), Entry::File(inode));
     }
 
-    /// Takes a file or folder away, on the medium at once.
+    /// Removes a file or folder, at once on the medium.
     pub fn take(&self, path: &Path) {
         let mut state = self.state();
         state.names.retain(|name, _| !name.starts_with(path));

@@ -6,7 +6,7 @@ use std::io::{self, Read, Write};
 use std::path::PathBuf;
 use voxtile::store::{DiskLock, DiskRead, DiskWrite, ReaderWatch, Scratch};
 
-/// A file that is read, as it was when it was opened.
+/// A file open for reading, with the content at the time of opening.
 pub(super) struct Reader {
     pub(super) disk: FaultyDisk,
     pub(super) path: PathBuf,
@@ -45,7 +45,7 @@ impl Drop for Reader {
     }
 }
 
-/// A file that is written.
+/// A file open for writing.
 pub(super) struct Writer {
     pub(super) disk: FaultyDisk,
     pub(super) path: PathBuf,
@@ -55,12 +55,12 @@ pub(super) struct Writer {
 impl Write for Writer {
     fn write(&mut self, buffer: &[u8]) -> io::Result<usize> {
         let mut state = self.disk.state();
-        let verdict = state.operation(Kind::NeedsRoom, &self.path);
+        let verdict = state.operation(Kind::NeedsSpace, &self.path);
         let content = state.content(self.inode);
-        // What is written anew is to be synced anew.
+        // New data must be synced again.
         content.lost = false;
         match verdict {
-            Verdict::Goes => {
+            Verdict::Succeeds => {
                 content.seen.extend_from_slice(buffer);
                 Ok(buffer.len())
             }
@@ -82,7 +82,7 @@ impl DiskWrite for Writer {
     }
 }
 
-/// Tells whether a file has readers.
+/// Reports whether a file has readers.
 pub(super) struct Watch {
     pub(super) disk: FaultyDisk,
     pub(super) inode: Inode,
@@ -94,7 +94,7 @@ impl ReaderWatch for Watch {
     }
 }
 
-/// A lock, until it is dropped.
+/// A held lock, released on drop.
 pub(super) struct Locked {
     pub(super) disk: FaultyDisk,
     pub(super) inode: Inode,
@@ -105,7 +105,7 @@ impl DiskLock for Locked {
     fn is_in_place(&self) -> io::Result<bool> {
         let mut state = self.disk.state();
         state.attempt(Kind::Reads, &self.path)?;
-        // An unfinished map that has got its name has taken the file along.
+        // The rename of an unfinished map to its name moves the file.
         Ok(state.names.get(&self.path) == Some(&Entry::File(self.inode)))
     }
 }
@@ -116,7 +116,7 @@ impl Drop for Locked {
     }
 }
 
-/// A file without a name: no crash leaves anything of it.
+/// An unnamed file, of which nothing remains after a crash.
 pub(super) struct ScratchFile {
     pub(super) disk: FaultyDisk,
     pub(super) folder: PathBuf,
@@ -125,7 +125,7 @@ pub(super) struct ScratchFile {
 
 impl Scratch for ScratchFile {
     fn append(&mut self, bytes: &[u8]) -> io::Result<()> {
-        self.disk.state().attempt(Kind::NeedsRoom, &self.folder)?;
+        self.disk.state().attempt(Kind::NeedsSpace, &self.folder)?;
         Scratch::append(&mut self.content, bytes)
     }
 

@@ -1,10 +1,10 @@
-//! A disk in memory that fails or loses power at the operation it is told to.
+//! A disk in memory that fails or loses power at a chosen operation.
 //!
-//! - [`FaultyDisk`] (`disk.rs`): what tests set up, break and look at;
-//! - `fault.rs`: what goes wrong, and what a crash leaves;
-//! - `state.rs`: what is on the disk, beside what is on the medium (`content.rs` of files, `names.rs` of folders), and
-//!   whether an operation goes (`operation.rs`);
-//! - `operations.rs` is the mapper's side, with the files that it has open in `handles.rs`.
+//! - [`FaultyDisk`] (`disk.rs`): the interface for tests
+//! - `fault.rs`: faults, and what a crash leaves
+//! - `state.rs`: the visible state and the state of the medium (`content.rs` for files, `names.rs` for folders), and
+//!   the outcome of operations (`operation.rs`)
+//! - `operations.rs`: the interface for mappers, with open files in `handles.rs`
 
 mod content;
 mod disk;

@@ -1,10 +1,10 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-/// The number of a file, whatever its names.
+/// Identifies a file, independent of its names.
 pub(super) type Inode = usize;
 
-/// What has a name.
+/// File or folder behind a name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Entry {
     Folder,
@@ -14,18 +14,18 @@ pub(super) enum Entry {
 /// All files and folders.
 pub(super) type Names = BTreeMap<PathBuf, Entry>;
 
-/// A change of names, on its way to the medium.
+/// A change of names, possibly not yet on the medium.
 #[derive(Clone, Debug)]
 pub(super) enum NameChange {
     Put(PathBuf, Entry),
     Remove(PathBuf),
-    /// And with it the files that were in it on the medium or on the way there: another folder may get its name.
+    /// Also removes the files that were in the folder, on the medium or unsynced: another folder may get its name.
     RemoveFolder(PathBuf, Vec<Inode>),
     Rename(PathBuf, PathBuf),
 }
 
 impl NameChange {
-    /// A folder around the names has got another name.
+    /// Adjusts the names to a rename of a folder around them.
     pub(super) fn follow(&mut self, from: &Path, to: &Path) {
         let follow = |name: &mut PathBuf| {
             if let Ok(rest) = name.strip_prefix(from)
@@ -43,7 +43,7 @@ impl NameChange {
         }
     }
 
-    /// Makes the change.
+    /// Applies the change.
     pub(super) fn apply(&self, names: &mut Names) {
         match self {
             Self::Put(path, entry) => {
@@ -67,7 +67,7 @@ impl NameChange {
         }
     }
 
-    /// Whether it puts one of these files below a folder.
+    /// Returns whether the change puts one of these files below a folder.
     pub(super) fn puts_one_of(&self, folder: &Path, files: &[Inode]) -> bool {
         matches!(self, Self::Put(name, entry) if is_one_of(name, entry, folder, files))
     }

@@ -1,15 +1,15 @@
 use std::io;
 
-/// What an operation does, as far as faults go.
+/// Kind of an operation, as far as faults depend on it.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(super) enum Kind {
     Reads,
     Changes,
-    NeedsRoom,
+    NeedsSpace,
 }
 
-/// Whether an operation goes.
+/// Outcome of an operation.
 pub(super) enum Verdict {
-    Goes,
+    Succeeds,
     Fails(io::Error),
 }

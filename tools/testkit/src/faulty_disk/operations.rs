@@ -27,7 +27,7 @@ impl Disk for FaultyDisk {
         let has_bad_bytes = self.state().unreadable.contains_key(path);
         let mut input = self.reader(path)?;
         if has_bad_bytes {
-            // What lies before is passed over.
+            // Skips the bytes before `offset`, which may be bad.
             input.at = input.bytes.len().min(offset as usize);
         } else {
             io::copy(&mut input.by_ref().take(offset), &mut io::sink())?;
@@ -53,7 +53,7 @@ impl Disk for FaultyDisk {
 
     fn create(&self, path: &Path) -> io::Result<Box<dyn DiskWrite>> {
         let mut state = self.state();
-        state.attempt(Kind::NeedsRoom, path)?;
+        state.attempt(Kind::NeedsSpace, path)?;
         let inode = state.file_or_new(path)?;
         let is_linked = state.names.values().filter(|entry| **entry == Entry::File(inode)).count() > 1;
         if is_linked {
@@ -130,7 +130,7 @@ impl Disk for FaultyDisk {
             state.unreadable.insert(to.to_owned(), bytes);
         }
         if entry == Entry::Folder {
-            // What is on its way to the medium in a folder is so under the folder's new name.
+            // Unsynced changes in a folder follow its rename.
             state.unsynced_names.iter_mut().for_each(|change| change.follow(from, to));
         }
         state.change_name(NameChange::Rename(from.to_owned(), to.to_owned()));
@@ -138,13 +138,13 @@ impl Disk for FaultyDisk {
     }
 
     fn scratch(&self, folder: &Path) -> io::Result<Box<dyn Scratch>> {
-        self.state().attempt(Kind::NeedsRoom, folder)?;
+        self.state().attempt(Kind::NeedsSpace, folder)?;
         Ok(Box::new(ScratchFile { disk: self.clone(), folder: folder.to_owned(), content: Vec::new() }))
     }
 
     fn link(&self, from: &Path, to: &Path) -> io::Result<()> {
         let mut state = self.state();
-        state.attempt(Kind::NeedsRoom, from)?;
+        state.attempt(Kind::NeedsSpace, from)?;
         let inode = state.file(from)?;
         match state.names.contains_key(to) {
             _ if !state.has_links => return Err(io::ErrorKind::Unsupported.into()),
@@ -165,7 +165,7 @@ impl Disk for FaultyDisk {
 
     fn create_folder(&self, path: &Path) -> io::Result<()> {
         let mut state = self.state();
-        state.attempt(Kind::NeedsRoom, path)?;
+        state.attempt(Kind::NeedsSpace, path)?;
         if state.names.contains_key(path) {
             return Err(io::ErrorKind::AlreadyExists.into());
         }
@@ -220,7 +220,7 @@ impl Disk for FaultyDisk {
         }
         let mut state = self.state();
         let is_there = state.names.contains_key(path);
-        state.attempt(if is_there { Kind::Changes } else { Kind::NeedsRoom }, path)?;
+        state.attempt(if is_there { Kind::Changes } else { Kind::NeedsSpace }, path)?;
         let inode = state.file_or_new(path)?;
         let content = state.content(inode);
         if std::mem::replace(&mut content.locked, true) {

@@ -8,7 +8,7 @@ use std::io;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
-/// What is on the disk, and what it does next.
+/// Content of the disk and its faults.
 #[derive(Debug)]
 pub(super) struct State {
     pub(super) contents: HashMap<Inode, Content>,
@@ -17,26 +17,26 @@ pub(super) struct State {
     pub(super) unsynced_names: Vec<NameChange>,
     pub(super) next_inode: Inode,
     pub(super) fault: Fault,
-    /// Whether that was one that stays.
-    pub(super) stays: bool,
+    /// Whether a fault was permanent.
+    pub(super) had_permanent_fault: bool,
     pub(super) operations: u64,
     pub(super) changes: u64,
     pub(super) renames: u64,
-    /// Names that no file gets.
+    /// Names to which renames fail.
     pub(super) refused_names: BTreeSet<PathBuf>,
-    pub(super) has_room: bool,
+    pub(super) has_space: bool,
     pub(super) has_links: bool,
     pub(super) crashed: bool,
-    /// Files and folders that every operation fails on.
+    /// Files and folders on which every operation fails.
     pub(super) broken: BTreeSet<PathBuf>,
-    /// Files of whose content some bytes cannot be read.
+    /// Files with unreadable bytes.
     pub(super) unreadable: BTreeMap<PathBuf, Range<usize>>,
-    /// How often each file was opened to be read from its beginning.
+    /// Number of times each file was opened for reading from its beginning.
     pub(super) opened: BTreeMap<PathBuf, u64>,
     pub(super) before_lock: Option<BeforeLock>,
 }
 
-/// What happens before the next lock is taken.
+/// Called before the next lock is taken.
 pub(super) struct BeforeLock(pub(super) Box<dyn FnOnce() + Send>);
 
 impl fmt::Debug for BeforeLock {
@@ -58,7 +58,9 @@ impl State {
         self.changes += u64::from(kind != Kind::Reads);
         let error = |kind: io::ErrorKind| Verdict::Fails(kind.into());
         match self.fault {
-            _ if self.crashed => Verdict::Fails(io::Error::other("the power is off, or the process dead")),
+            _ if self.crashed => {
+                Verdict::Fails(io::Error::other("the power is off or the process was killed"))
+            }
             Fault::Crashes(at) if change == at && kind != Kind::Reads => {
                 self.crashed = true;
                 Verdict::Fails(io::Error::other("the power is off"))
@@ -76,19 +78,19 @@ impl State {
                 self.crashed = true;
                 Verdict::Fails(io::Error::other("input/output error"))
             }
-            Fault::IsFull(at) if change >= at && kind == Kind::NeedsRoom => {
-                self.has_room = false;
+            Fault::IsFull(at) if change >= at && kind == Kind::NeedsSpace => {
+                self.has_space = false;
                 error(io::ErrorKind::StorageFull)
             }
             Fault::IsReadOnly(at) if change >= at && kind != Kind::Reads => {
-                self.has_room = false;
+                self.has_space = false;
                 error(io::ErrorKind::ReadOnlyFilesystem)
             }
-            _ => Verdict::Goes,
+            _ => Verdict::Succeeds,
         }
     }
 
-    /// Whether a file gets another name, as far as [`Fault::RefusesRename`] goes.
+    /// Fails the renames that [`Fault::RefusesRename`] selects.
     pub(super) fn attempt_rename(&mut self, to: &Path) -> io::Result<()> {
         if self.fault == Fault::RefusesRename(self.renames) {
             self.refused_names.insert(to.to_owned());
@@ -102,7 +104,7 @@ impl State {
 
     pub(super) fn attempt(&mut self, kind: Kind, path: &Path) -> io::Result<()> {
         match self.operation(kind, path) {
-            Verdict::Goes => Ok(()),
+            Verdict::Succeeds => Ok(()),
             Verdict::Fails(error) => Err(error),
         }
     }
@@ -124,7 +126,7 @@ impl State {
         self.unsynced_names.push(change);
     }
 
-    /// The file, made if missing.
+    /// Returns the file, created if missing.
     pub(super) fn file_or_new(&mut self, path: &Path) -> io::Result<Inode> {
         match self.file(path) {
             Err(error) if error.kind() == io::ErrorKind::NotFound => {
@@ -145,7 +147,7 @@ impl State {
         let loses =
             matches!(self.fault, Fault::LosesSync(at) | Fault::LosesSyncAndDies(at) if at == self.changes);
         match self.operation(Kind::Changes, path) {
-            Verdict::Goes => {
+            Verdict::Succeeds => {
                 let content = self.content(inode);
                 if !content.lost {
                     content.on_medium = content.seen.clone();
@@ -160,7 +162,6 @@ impl State {
     }
 }
 
-/// EIO.
 pub(super) fn medium_error() -> io::Error {
     io::Error::from_raw_os_error(5)
 }

@@ -6,8 +6,8 @@ use report::{Answer, Cell, Table};
 use std::cell::RefCell;
 use std::ffi::OsString;
 
-/// What is asked: its name in the program's answer, and a word for the table.
-const ASKED: [(&str, &str); 8] = [
+/// The queries: key in the program's output, and name in the table.
+const QUERIES: [(&str, &str); 8] = [
     ("ray", "ray of 60 m"),
     ("ray_unknown_stops", "ray that the unknown stops"),
     ("point", "point"),
@@ -18,9 +18,9 @@ const ASKED: [(&str, &str); 8] = [
     ("occupied_voxels_of_the_map", "occupied voxels of the map"),
 ];
 
-/// What a question to a map in memory takes.
+/// Measures queries of a map in memory.
 pub fn answer(setting: &Setting) -> Result<Answer> {
-    let head = ["scans".to_owned()].into_iter().chain(ASKED.map(|(_, what)| what.to_owned()));
+    let head = ["scans".to_owned()].into_iter().chain(QUERIES.map(|(_, what)| what.to_owned()));
     let mut table = Table::new(
         "questions",
         "Microseconds of CPU a question, maps in memory, one thread: before, now, and how many times as fast. Both give \
@@ -34,9 +34,9 @@ pub fn answer(setting: &Setting) -> Result<Answer> {
             let mut command = programs.command("questions", 1);
             command.arg(&source).arg(set.resolution_m.to_string()).arg(set.scans.to_string());
             let json = json_of(&mut command)?;
-            hits.borrow_mut().push(ASKED.map(|(name, _)| number(&json, &format!("/{name}/hits")).ok()));
-            // An earlier version may not ask everything.
-            Ok(ASKED.map(|(name, _)| number(&json, &format!("/{name}/us")).unwrap_or(f64::NAN)))
+            hits.borrow_mut().push(QUERIES.map(|(name, _)| number(&json, &format!("/{name}/hits")).ok()));
+            // An earlier version may lack some queries.
+            Ok(QUERIES.map(|(name, _)| number(&json, &format!("/{name}/us")).unwrap_or(f64::NAN)))
         })?;
         check_answers(&set, &hits.into_inner())?;
         let cells = pairs.map(|pair| Cell::Text(pair.text(if pair.now < 1.0 { 3 } else { 1 })));
@@ -45,16 +45,16 @@ pub fn answer(setting: &Setting) -> Result<Answer> {
     Ok(Answer { tables: vec![table], plots: Vec::new() })
 }
 
-/// Checks that all runs of both versions had as many hits, of what they asked.
-fn check_answers(set: &ScanSet, runs: &[[Option<f64>; ASKED.len()]]) -> Result<()> {
-    for (place, (name, _)) in ASKED.iter().enumerate() {
+/// Checks that all runs of both versions have the same number of hits.
+fn check_answers(set: &ScanSet, runs: &[[Option<f64>; QUERIES.len()]]) -> Result<()> {
+    for (place, (name, _)) in QUERIES.iter().enumerate() {
         let hits: Vec<f64> = runs.iter().filter_map(|hits| hits[place]).collect();
         ensure!(hits.windows(2).all(|two| two[0] == two[1]), "{}: {name}: {hits:?} hits", set.title());
     }
     Ok(())
 }
 
-/// What the program takes for the scans: the name of a survey, or a folder. `None` where it is absent.
+/// Argument of the program for the scans: name of a survey, or a folder. `None` if the folder is missing.
 fn source_of(set: &ScanSet, setting: &Setting) -> Option<OsString> {
     if !RECORDED.contains(&set.name) {
         return Some(set.name.into());

@@ -9,15 +9,15 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-/// Exports of one map that are timed together.
+/// Number of exports of a map that are timed together.
 const EXPORTS: usize = 20;
 
-/// What maps on disk take: a flush, and an export.
+/// Measures flushes and exports of maps on disk.
 pub fn answer(setting: &Setting) -> Result<Answer> {
     Ok(Answer { tables: vec![flush(setting)?, export(setting)?], plots: Vec::new() })
 }
 
-/// Scans to flushed files beside the same scans into memory.
+/// Compares scans to flushed files with the same scans into memory.
 fn flush(setting: &Setting) -> Result<Table> {
     let mut table = Table::new(
         "flush",
@@ -49,7 +49,7 @@ fn flush(setting: &Setting) -> Result<Table> {
     Ok(table)
 }
 
-/// An export of the occupied voxels beside `cat` of the files that they are read from.
+/// Compares an export of the occupied voxels with `cat` of the tiles' files.
 fn export(setting: &Setting) -> Result<Table> {
     let mut table = Table::new(
         "export",
@@ -92,17 +92,17 @@ fn export(setting: &Setting) -> Result<Table> {
     Ok(table)
 }
 
-/// Builds a map of a recorded set with a version's own command: an earlier one may not read what the present one writes.
+/// Builds a map of a recorded set with the version's own command, as an earlier version may not read newer maps.
 fn build_map(programs: &Programs, scans: &Path, map: &Path, storage: &str) -> Result<()> {
     let mut command = programs.command("voxtile", 2);
     command.arg("build").arg(scans).arg("-o").arg(map).args(["--resolution", "0.1"]);
     command.args(["--max-range", "60", "--storage", storage]);
-    let output = command.output().with_context(|| format!("{command:?}: cannot start it"))?;
+    let output = command.output().with_context(|| format!("{command:?}: cannot start"))?;
     ensure!(output.status.success(), "{command:?}: {}", String::from_utf8_lossy(&output.stderr));
     Ok(())
 }
 
-/// The files of a name in the folders of a folder.
+/// Files with this name in the subfolders.
 fn files_named(folder: &Path, name: &str) -> Result<Vec<PathBuf>> {
     let cannot_list = || format!("{}: cannot list", folder.display());
     let mut files = Vec::new();

@@ -6,7 +6,7 @@ use crate::setting::Setting;
 use anyhow::Result;
 use report::{Answer, Cell, Table};
 
-/// What a ray takes on one thread, once a scan and where every ray counts.
+/// Measures the time per ray on one thread, with per-scan and with per-ray updates.
 pub fn answer(setting: &Setting) -> Result<Answer> {
     let mut table = Table::new(
         "insertion",
@@ -28,7 +28,7 @@ pub fn answer(setting: &Setting) -> Result<Answer> {
     Ok(Answer { tables: vec![table], plots: Vec::new() })
 }
 
-/// Nanoseconds of CPU of a build on one thread.
+/// CPU time of a build on one thread, in nanoseconds.
 fn cpu_ns(programs: &Programs, set: &ScanSet, stream: &Stream, is_every_ray: bool) -> Result<f64> {
     let mut command = programs.command("voxtile_contender", 1);
     command.arg("build").arg(&stream.path).arg("--resolution").arg(set.resolution_m.to_string());

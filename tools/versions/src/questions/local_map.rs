@@ -7,7 +7,7 @@ use report::{Answer, Cell, Table};
 /// The presets of `voxtile local`.
 const PRESETS: [&str; 3] = ["local", "autonomous", "passive"];
 
-/// What an update of the local map takes.
+/// Measures updates of the local map.
 pub fn answer(setting: &Setting) -> Result<Answer> {
     let mut table = Table::new(
         "local_map",

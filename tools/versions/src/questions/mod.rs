@@ -1,4 +1,4 @@
-//! What is asked of both versions: a module for each section of the page.
+//! The measurements of both versions: one module per section of the page.
 
 mod answers;
 mod files;
@@ -12,13 +12,13 @@ use report::Answer;
 
 /// A section of the page.
 pub struct Question {
-    /// What `--only` takes.
+    /// Value of `--only`.
     pub name: &'static str,
-    /// Answers it.
+    /// Measures the answer.
     pub answer: fn(&Setting) -> Result<Answer>,
 }
 
-/// All of them, in the page's order.
+/// All questions, in the order of the page.
 pub const QUESTIONS: [Question; 5] = [
     Question { name: "insertion", answer: insertion::answer },
     Question { name: "threads", answer: threads::answer },

@@ -5,13 +5,13 @@ use crate::setting::Setting;
 use anyhow::Result;
 use report::{Answer, Cell, Samples, Table};
 
-/// Clock and CPU of a build, in seconds.
+/// Wall and CPU time of a build, in seconds.
 struct Build {
     wall_s: f64,
     cpu_s: f64,
 }
 
-/// What a second thread brings.
+/// Measures the gain of a second thread.
 pub fn answer(setting: &Setting) -> Result<Answer> {
     let mut table = Table::new(
         "threads",
@@ -25,8 +25,8 @@ pub fn answer(setting: &Setting) -> Result<Answer> {
         let mut gains: [[Samples; 2]; 3] = Default::default();
         let mut one_thread_ms = Samples::default();
         for _ in 0..versions.runs {
-            let ways = [(&versions.before, false), (&versions.now, false), (&versions.now, true)];
-            for ((programs, is_together), gains) in ways.into_iter().zip(&mut gains) {
+            let modes = [(&versions.before, false), (&versions.now, false), (&versions.now, true)];
+            for ((programs, is_together), gains) in modes.into_iter().zip(&mut gains) {
                 let one = build(programs, &set, &stream, 1, false)?;
                 let two = build(programs, &set, &stream, 2, is_together)?;
                 gains[0].push(one.wall_s / two.wall_s);

@@ -7,26 +7,26 @@ use voxtile::space::Point;
 use voxtile::{Queries, Result, UnknownAs};
 use voxtile_local::{LocalView, Obstacle};
 
-/// The paper's limit.
+/// Limit in the paper.
 const MAX_SPEED_M_S: f64 = 9.3;
-/// What a quadrotor tilted by 38 degrees has.
+/// Acceleration of a quadrotor tilted by 38 degrees.
 const MAX_ACCELERATION_M_S2: f64 = 7.5;
-/// The paper's planning horizon.
+/// Planning horizon of the paper.
 const HORIZON_M: f64 = 25.0;
 const RADIUS_M: f64 = 0.2;
-/// As far as it takes to stop, and more.
+/// Longer than the braking distance.
 const BRAKING_LOOK_M: f64 = 12.0;
-/// Between scans, each of which is followed by a plan.
+/// Interval of scans, each of which is followed by a plan.
 const SCAN_EVERY_S: f64 = 0.1;
 const STEP_S: f64 = 0.01;
 const MAX_TIME_S: f64 = 120.0;
 
-/// What became of a flight.
+/// Result of a flight.
 pub struct Flight {
     pub path: Vec<Point>,
     pub length_m: f64,
     pub time_s: f64,
-    /// Mean time of a plan.
+    /// Mean duration of a plan.
     pub planning_ms: f64,
     pub has_collided: bool,
     pub has_arrived: bool,
@@ -45,7 +45,7 @@ impl fmt::Display for Flight {
     }
 }
 
-/// Flies from the start to the goal: scan, plan, follow, until it arrives, collides, or the time is over.
+/// Flies from the start to the goal: scans, plans and follows the path until it arrives, collides or exceeds the time.
 pub fn fly(forest: &Forest, map: &mut impl PlannersMap) -> Result<Flight> {
     let (mut at, mut velocity) = (START, [0.0; 3]);
     let mut yaw_rad = 0.0;
@@ -84,14 +84,14 @@ pub fn fly(forest: &Forest, map: &mut impl PlannersMap) -> Result<Flight> {
     Ok(flight)
 }
 
-/// The place on the way to the goal where the horizon ends.
+/// The point within the horizon towards the goal.
 fn local_goal(at: Point) -> Point {
     let left_m = distance_m(at, GOAL);
     let share = (HORIZON_M / left_m).min(1.0);
     std::array::from_fn(|k| at[k] + (GOAL[k] - at[k]) * share)
 }
 
-/// Along the path: to a place ahead on it, as fast as its corners let.
+/// Velocity along the path: towards a point ahead on it, as fast as its corners permit.
 fn wanted_velocity(path: &[Point], at: Point, velocity: Point) -> Point {
     let lookahead_m = 0.6 + 0.18 * speed(velocity);
     let (mut left_m, mut target) = (lookahead_m, path[path.len() - 1]);
@@ -111,7 +111,7 @@ fn wanted_velocity(path: &[Point], at: Point, velocity: Point) -> Point {
     std::array::from_fn(|k| (target[k] - at[k]) / length_m * limit)
 }
 
-/// No faster than lets the drone stop before the first obstacle straight ahead.
+/// Limits the velocity so that the drone can stop before the first obstacle straight ahead.
 fn braked(view: &LocalView, wanted: Point, at: Point, velocity: Point) -> Point {
     let ahead = |m: f64| std::array::from_fn(|k| at[k] + velocity[k] / speed(velocity).max(1e-9) * m);
     let obstacles = view.obstacles(Obstacle::Inflated);
@@ -119,13 +119,13 @@ fn braked(view: &LocalView, wanted: Point, at: Point, velocity: Point) -> Point 
         Ok(Some(hit)) => distance_m(at, hit.center_m),
         _ => BRAKING_LOOK_M,
     };
-    // Part of the acceleration is left to steer.
+    // Reserves part of the acceleration for steering.
     let limit = (2.0 * 0.7 * MAX_ACCELERATION_M_S2 * clear_m).sqrt().max(0.8);
     let share = (limit / speed(wanted).max(1e-9)).min(1.0);
     wanted.map(|x| x * share)
 }
 
-/// The leg of the path that is nearest.
+/// The nearest leg of the path.
 fn nearest_leg(path: &[Point], at: Point) -> usize {
     let to_leg_m = |k: usize| {
         let (a, b) = (path[k], path[k + 1]);
@@ -136,7 +136,7 @@ fn nearest_leg(path: &[Point], at: Point) -> usize {
     (0..path.len().saturating_sub(1)).min_by(|&a, &b| to_leg_m(a).total_cmp(&to_leg_m(b))).unwrap_or(0)
 }
 
-/// As fast as lets the drone slow down to what each corner allows.
+/// Maximum speed that permits to brake for each corner.
 fn speed_limit(path: &[Point], at: Point) -> f64 {
     let mut limit = MAX_SPEED_M_S;
     let mut left_m = path.get(1).map_or(0.0, |corner| distance_m(at, *corner));
@@ -145,7 +145,7 @@ fn speed_limit(path: &[Point], at: Point) -> f64 {
             [0, 1].map(|leg| std::array::from_fn(|k| corner[leg + 1][k] - corner[leg][k]));
         let dot: f64 = (0..3).map(|k| before[k] * after[k]).sum();
         let turn_rad = (dot / (speed(before) * speed(after)).max(1e-9)).clamp(-1.0, 1.0).acos();
-        // A corner of a sharp turn is rounded in a metre or so.
+        // A sharp corner is rounded within about a metre.
         let through = (MAX_ACCELERATION_M_S2 * 1.2 / turn_rad.max(1e-3)).sqrt().max(1.5);
         limit = limit.min((through * through + MAX_ACCELERATION_M_S2 * left_m).sqrt());
         left_m += speed(after);
@@ -153,7 +153,7 @@ fn speed_limit(path: &[Point], at: Point) -> f64 {
     limit
 }
 
-/// Moves for one step, with an acceleration that is limited.
+/// Moves for one step, with limited acceleration.
 fn step(at: &mut Point, velocity: &mut Point, wanted: Point) {
     let change: Point = std::array::from_fn(|k| wanted[k] - velocity[k]);
     let share = (MAX_ACCELERATION_M_S2 * STEP_S / speed(change).max(1e-9)).min(1.0);

@@ -2,7 +2,7 @@ use voxtile::Scan;
 use voxtile::space::Point;
 use voxtile_simulation::{Random, Scene, Solid};
 
-/// Trees and thickets on 200 m x 35 m, all from a seed.
+/// Random trees and thickets on 200 m x 35 m.
 pub struct Forest {
     pub trees: Vec<Solid>,
     scene: Scene,
@@ -11,17 +11,17 @@ pub struct Forest {
 
 pub const LENGTH_M: f64 = 200.0;
 pub const WIDTH_M: f64 = 35.0;
-/// Where flights begin and end.
+/// Start and goal of the flights.
 pub const START: Point = [-6.0, 0.0, 2.0];
 pub const GOAL: Point = [206.0, 0.0, 2.0];
 
-/// Trees a square metre.
+/// Trees per square metre.
 const DENSITY: f64 = 0.07;
-/// Share of these that are thickets.
+/// Share of thickets.
 const THICKETS: f64 = 0.15;
-/// Between the middles of two trees.
+/// Minimum distance between the centers of two trees.
 const MIN_DISTANCE_M: f64 = 2.4;
-/// The paper's sensor.
+/// Sensor of the paper.
 const RANGE_M: f64 = 40.0;
 const VIEW_DEG: [f64; 2] = [60.0, 45.0];
 const RAYS: [u32; 2] = [120, 40];
@@ -39,7 +39,7 @@ impl Forest {
         }
         let tree = |[x, y]: [f64; 2]| {
             let half_m = random.between(0.15, 0.45);
-            // A thicket stands across the way.
+            // A thicket extends across the flight direction.
             let is_thicket = random.chance(THICKETS) && x > 10.0;
             let across_m = if is_thicket { random.between(1.0, 4.0) } else { half_m };
             Solid::new([x - half_m, y - across_m, 0.0], [x + half_m, y + across_m, 20.0], 0.4)
@@ -49,7 +49,7 @@ impl Forest {
         Self { trees, scene, seed }
     }
 
-    /// What the sensor sees, looking along `yaw_rad`.
+    /// Scan by the sensor, looking along `yaw_rad`.
     pub fn scan(&self, origin: Point, yaw_rad: f64, number: u64) -> Scan {
         let mut noise = Random::of(self.seed, &[4, number as i64]);
         let mut points = Vec::new();
@@ -71,7 +71,7 @@ impl Forest {
         Scan { origin, points, intensities: None }
     }
 
-    /// Whether a ball touches a tree or the ground.
+    /// Returns whether a ball touches a tree or the ground.
     pub fn collides(&self, center: Point, radius_m: f64) -> bool {
         let touches = |tree: &Solid| tree.bounds.distance_squared(center) <= radius_m * radius_m;
         center[2] <= radius_m || self.trees.iter().any(touches)

@@ -1,7 +1,7 @@
-//! The paper's table III: the same plain A* planner flies through synthetic forests with a local map, and with a fixed
+//! Table III of the paper: the same A* planner flies through synthetic forests with a local map, and with a fixed
 //! window of 16 m around the robot. The picture shows every forest from above with both flights.
 //!
-//! It simulates a point with limited acceleration, not a drone: it compares how far the planner sees.
+//! The simulation compares planning ranges only: it moves a point with limited acceleration, not a drone.
 
 mod flight;
 mod forest;
@@ -18,16 +18,16 @@ use window::Window;
 
 /// Edge of a voxel.
 const RESOLUTION_M: f64 = 0.1;
-/// Half of the drone's width, and air for what it is off its path: what obstacles are inflated by.
+/// Inflation of obstacles: half of the drone's width, and a margin for deviations from the path.
 const INFLATION_M: f64 = 0.6;
 
-/// A map that a planner flies by.
+/// A map that a planner can use.
 trait PlannersMap {
-    /// Takes a scan.
+    /// Inserts a scan.
     fn insert(&mut self, scan: &Scan) -> Result<()>;
-    /// What the planner sees.
+    /// View for the planner.
     fn view(&self) -> &LocalView;
-    /// Memory for the map alone, in bytes.
+    /// Memory of the map alone, in bytes.
     fn bytes(&self) -> usize;
 }
 
@@ -45,13 +45,13 @@ impl PlannersMap for LocalMap {
     }
 }
 
-/// Flies through so many forests, prints the table and writes the picture.
+/// Flies through `forests` forests, prints the table and writes the picture.
 pub fn run(forests: u64, picture: &Path) -> anyhow::Result<()> {
     let mut flights: [Vec<Flight>; 2] = Default::default();
     let mut drawn = Vec::new();
     for seed in 0..forests {
         let forest = Forest::new(seed);
-        // The paper's: 50 000 voxels, no limit of input nor inflation.
+        // Parameters of the paper: 50 000 voxels, no limit of input or inflation range.
         let parameters = LocalParameters::passive_perception().with_inflation_radius(INFLATION_M);
         flights[0].push(fly(&forest, &mut LocalMap::new(RESOLUTION_M, parameters)?)?);
         flights[1].push(fly(&forest, &mut Window::new()?)?);
@@ -69,7 +69,7 @@ pub fn run(forests: u64, picture: &Path) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Means of length, time and speed over the flights that arrived; of the rest over all.
+/// Means of length, time and speed over the flights that arrived; other means over all flights.
 fn summary(flights: &[Flight]) -> String {
     let mean = |values: &mut dyn Iterator<Item = f64>| {
         let values: Vec<f64> = values.collect();

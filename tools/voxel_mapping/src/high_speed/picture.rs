@@ -2,13 +2,13 @@ use super::flight::Flight;
 use super::forest::{Forest, WIDTH_M};
 use std::fmt::Write;
 
-/// Pixels a metre.
+/// Pixels per metre.
 const SCALE: f64 = 5.0;
-/// From forest to forest, in metres.
+/// Distance between forests, in metres.
 const PITCH_M: f64 = WIDTH_M + 6.0;
 const COLORS: [&str; 2] = ["#1f9e89", "#e0662f"];
 
-/// A forest from above with the flights by the two maps, as a group of an SVG.
+/// Draws a forest from above with the flights of both maps, as a group of an SVG.
 pub fn row(forest: &Forest, flights: [&Flight; 2]) -> String {
     let mut row = String::new();
     let (x, y) = (|x: f64| (x + 10.0) * SCALE, |y: f64| (PITCH_M / 2.0 - y) * SCALE);
@@ -37,7 +37,7 @@ pub fn row(forest: &Forest, flights: [&Flight; 2]) -> String {
     row
 }
 
-/// All forests, one below the other, and what the colors mean.
+/// Puts all forests below each other, with a legend.
 pub fn page(rows: &[String]) -> String {
     let (width, height) = (220.0 * SCALE, rows.len() as f64 * PITCH_M * SCALE + 40.0);
     let mut page = format!(

@@ -4,11 +4,11 @@ use voxtile::space::{Grid, Point, VoxelIndex};
 use voxtile::{Result, Scan};
 use voxtile_local::{LocalMap, LocalParameters, LocalView};
 
-/// A fixed window around the robot, as array-based planners have it: what is outside is not there, and what leaves it
-/// is forgotten.
+/// A fixed window around the robot, as in array-based planners: it contains nothing outside, and forgets what leaves
+/// it.
 ///
-/// The answers come from a local map that is made anew for every scan from what the window holds; its time is not that
-/// of an array, and is not measured.
+/// For each scan, a local map is rebuilt from the voxels of the window. Its time is not that of an array, and is not
+/// measured.
 pub struct Window {
     grid: Grid,
     occupied: HashSet<VoxelIndex>,
@@ -36,7 +36,7 @@ impl PlannersMap for Window {
         self.occupied.extend(seen.filter_map(|point| self.grid.voxel_of(*point)));
         self.occupied.retain(|voxel| is_inside(self.grid.center_m(*voxel)));
         let mut centers: Vec<Point> = self.occupied.iter().map(|voxel| self.grid.center_m(*voxel)).collect();
-        // The order of a hash set differs from run to run.
+        // Sorted, as the order of a hash set differs between runs.
         centers.sort_unstable_by(|a, b| a.partial_cmp(b).unwrap_or(std::cmp::Ordering::Equal));
         self.inflated = empty()?;
         self.inflated.insert_relayed(scan.origin, &centers).map(drop)
@@ -47,7 +47,7 @@ impl PlannersMap for Window {
     }
 
     fn bytes(&self) -> usize {
-        // An array of a count of inflation and a log-odds of two bytes for every voxel of the window.
+        // Size of an array with a count of inflation and a log-odds, two bytes each, per voxel of the window.
         ((EDGE_M / RESOLUTION_M).powi(3) * 4.0) as usize
     }
 }

@@ -3,7 +3,7 @@ use voxtile::Scan;
 use voxtile::space::Point;
 use voxtile_simulation::{Random, Scene, Solid};
 
-/// Trees and walls of bushes on 120 m x 30 m, all from a seed; low enough to be looked at from above.
+/// Random trees and walls of bushes on 120 m x 30 m, low enough to be seen from above.
 pub struct Forest {
     pub trees: Vec<Solid>,
     scene: Scene,
@@ -36,7 +36,7 @@ impl Forest {
         Self { trees, scene, seed }
     }
 
-    /// What a sensor sees that looks along x, tilted down.
+    /// Scan by a sensor that looks along x, tilted down.
     pub fn scan(&self, sensing: Sensing, origin: Point, number: u64) -> Scan {
         let mut noise = Random::of(self.seed, &[9, number as i64]);
         let (sin, cos) = sensing.pitch_deg.to_radians().sin_cos();
@@ -62,7 +62,7 @@ impl Forest {
         Scan { origin, points, intensities: None }
     }
 
-    /// Whether a ball touches a tree or the ground.
+    /// Returns whether a ball touches a tree or the ground.
     pub fn collides(&self, center: Point, radius_m: f64) -> bool {
         let touches = |tree: &Solid| tree.bounds.distance_squared(center) <= radius_m * radius_m;
         center[2] <= radius_m || self.trees.iter().any(touches)

@@ -1,9 +1,9 @@
-//! The paper's table II: travellers without sensors follow the maps that two spotters share, around the trees of
-//! synthetic forests; and, to compare, travellers with their own sensor and no sharing. The picture shows the first
+//! Table II of the paper: travellers without sensors fly around the trees of synthetic forests with the maps that two
+//! spotters share. For comparison, other travellers use their own sensors without sharing. The picture shows the first
 //! forest from above.
 //!
-//! It simulates points that fly at the paper's 3 m/s and do not avoid each other: it shows that a shared map is enough
-//! to plan by.
+//! The simulation shows that a shared map is enough for planning: it moves points at the paper's 3 m/s that do not
+//! avoid each other.
 
 mod forest;
 mod picture;
@@ -17,21 +17,21 @@ use std::time::Duration;
 
 /// Edge of a voxel.
 const RESOLUTION_M: f64 = 0.1;
-/// Between two looks of the planner, and two scans of a spotter (5 Hz).
+/// Interval of plans, and of the scans of a spotter (5 Hz).
 const STEP: Duration = Duration::from_millis(200);
-/// A flight that is not over by then does not arrive.
+/// A flight that takes longer has not arrived.
 const MAX_STEPS: u32 = 600;
-/// How long spotters look before travellers begin.
+/// Number of steps of the spotters before the travellers start.
 const HEAD_START_STEPS: u32 = 25;
 
-/// What one forest gave.
+/// Result of a forest.
 struct Outcome {
     travellers: Vec<Traveller>,
-    /// Bytes a second that went from robot to robot, or from the sensors, at 16 bytes a point.
+    /// Bytes per second between the robots, or from the sensors at 16 bytes per point.
     bytes_per_s: f64,
 }
 
-/// Flies through so many forests, prints the table and writes the picture.
+/// Flies through `forests` forests, prints the table and writes the picture.
 pub fn run(forests: u64, picture: &Path) -> anyhow::Result<()> {
     let mut outcomes: [Vec<Outcome>; 2] = Default::default();
     for seed in 0..forests {
@@ -44,7 +44,7 @@ pub fn run(forests: u64, picture: &Path) -> anyhow::Result<()> {
                 picture::page(&forest, &sharing, [&outcomes[0][0].travellers, &outcomes[1][0].travellers]);
             fs::write(picture, page)?;
         }
-        eprintln!("forest {seed} is flown through");
+        eprintln!("forest {seed} is done");
     }
     println!("| setup | d_fly (m) | t_fly (s) | t_cal (ms) | collisions a flight | arrived | kB/s |");
     println!("|---|---|---|---|---|---|---|");
@@ -55,7 +55,7 @@ pub fn run(forests: u64, picture: &Path) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Travellers that know what two spotters share.
+/// Flies with the shared maps of two spotters.
 fn by_shared_map(forest: &Forest, sharing: &mut Sharing) -> voxtile::Result<Outcome> {
     let mut travellers = Traveller::four()?;
     for step in 0..MAX_STEPS {
@@ -63,7 +63,7 @@ fn by_shared_map(forest: &Forest, sharing: &mut Sharing) -> voxtile::Result<Outc
             travellers.iter().map(|traveller| traveller.at[0]).sum::<f64>() / travellers.len() as f64;
         sharing.step(forest, middle, step)?;
         for traveller in travellers.iter_mut().filter(|traveller| !traveller.is_over()) {
-            traveller.hear(sharing)?;
+            traveller.receive(sharing)?;
             if step >= HEAD_START_STEPS {
                 traveller.fly(forest);
             }
@@ -76,7 +76,7 @@ fn by_shared_map(forest: &Forest, sharing: &mut Sharing) -> voxtile::Result<Outc
     Ok(Outcome { travellers, bytes_per_s })
 }
 
-/// Travellers that see for themselves, 10 m far.
+/// Flies with the travellers' own sensors of 10 m range.
 fn by_own_sensor(forest: &Forest) -> voxtile::Result<Outcome> {
     let mut travellers = Traveller::four()?;
     let (mut points, mut steps) = (0, 0);
@@ -84,10 +84,10 @@ fn by_own_sensor(forest: &Forest) -> voxtile::Result<Outcome> {
         for (number, traveller) in
             travellers.iter_mut().enumerate().filter(|(_, traveller)| !traveller.is_over())
         {
-            // 10 Hz: twice a step.
+            // 10 Hz: two scans per step.
             for half in 0..2 {
                 let sensing = Sensing::ONBOARD;
-                points += traveller.look(forest, sensing, u64::from(step) * 16 + number as u64 * 2 + half)?;
+                points += traveller.scan(forest, sensing, u64::from(step) * 16 + number as u64 * 2 + half)?;
             }
             traveller.fly(forest);
         }
@@ -100,7 +100,7 @@ fn by_own_sensor(forest: &Forest) -> voxtile::Result<Outcome> {
     Ok(Outcome { travellers, bytes_per_s })
 }
 
-/// Means of lengths and times over the flights that arrived, of the rest over all.
+/// Means of lengths and times over the flights that arrived; other means over all flights.
 fn summary(outcomes: &[Outcome]) -> String {
     let mean = |values: Vec<f64>| values.iter().sum::<f64>() / values.len().max(1) as f64;
     let all = || outcomes.iter().flat_map(|outcome| &outcome.travellers);

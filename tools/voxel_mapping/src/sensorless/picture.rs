@@ -3,12 +3,12 @@ use super::robots::{Sharing, Traveller};
 use std::collections::BTreeSet;
 use std::fmt::Write;
 
-/// Pixels a metre.
+/// Pixels per metre.
 const SCALE: f64 = 9.0;
 const MARGIN_M: f64 = 4.0;
 const COLORS: [&str; 4] = ["#b2182b", "#d6604d", "#2166ac", "#4393c3"];
 
-/// The forest from above, twice: with what was shared and the flights by it, and with the flights by own sensors.
+/// Draws the forest from above twice: with the shared voxels and their flights, and with the flights with own sensors.
 pub fn page(forest: &Forest, sharing: &Sharing, flights: [&[Traveller]; 2]) -> String {
     let (width, height) = ((LENGTH_M + 2.0 * MARGIN_M) * SCALE, (WIDTH_M + 2.0 * MARGIN_M) * SCALE);
     let mut page = format!(
@@ -16,7 +16,7 @@ pub fn page(forest: &Forest, sharing: &Sharing, flights: [&[Traveller]; 2]) -> S
          <rect width='100%' height='100%' fill='white'/>",
         2.0 * height
     );
-    let titles = ["sensorless: by the maps of two spotters (green: shared voxels)", "by their own sensors"];
+    let titles = ["sensorless: with the maps of two spotters (green: shared voxels)", "with own sensors"];
     for (number, (flights, title)) in flights.into_iter().zip(titles).enumerate() {
         let top = number as f64 * height;
         let _ = write!(page, "<g transform='translate(0 {top})'><text x='20' y='22'>{title}</text>");

@@ -12,28 +12,28 @@ use voxtile_share::{MapWatch, Receiver, ReceiverConfig, Sender, SenderConfig, Vo
 #[derive(Clone, Copy)]
 pub struct Sensing {
     pub range_m: f64,
-    /// Across and up.
+    /// Horizontal and vertical.
     pub view_deg: [f64; 2],
     pub rays: [u32; 2],
-    /// How far it is tilted down.
+    /// Downward tilt.
     pub pitch_deg: f64,
 }
 
 impl Sensing {
-    /// The paper's sensor of a traveller.
+    /// Sensor of a traveller in the paper.
     pub const ONBOARD: Self =
         Self { range_m: 10.0, view_deg: [360.0, 90.0], rays: [180, 24], pitch_deg: 0.0 };
-    /// The paper's sensor of a spotter.
+    /// Sensor of a spotter in the paper.
     const SPOTTER: Self = Self { range_m: 30.0, view_deg: [100.0, 60.0], rays: [110, 66], pitch_deg: 80.0 };
 }
 
-/// Two spotters over the forest, and a receiver of each: travellers hear the same.
+/// Two spotters above the forest, each with a receiver. All travellers receive the same voxels.
 pub struct Sharing {
     spotters: [Spotter; 2],
     now: Duration,
-    /// All that came so far, of either.
-    heard: VoxelSet,
-    /// What came with the last step: the centers of voxels.
+    /// All voxels received so far, from both spotters.
+    received: VoxelSet,
+    /// Centers of the voxels received in the last step.
     pub new_points: Vec<Point>,
 }
 
@@ -46,10 +46,10 @@ struct Spotter {
     number: u64,
 }
 
-/// A tenth of the packets is lost.
+/// Share of lost packets.
 const LOSS: f64 = 0.1;
 const SPOTTER_HEIGHT_M: f64 = 14.0;
-/// How far spotters are ahead of the travellers.
+/// Distance of the spotters ahead of the travellers.
 const AHEAD_M: f64 = 7.0;
 
 impl Sharing {
@@ -69,22 +69,27 @@ impl Sharing {
                 number,
             })
         };
-        let heard = VoxelSet::new(Grid::new(RESOLUTION_M, 100.0 * RESOLUTION_M)?);
-        Ok(Self { spotters: [spotter(0)?, spotter(1)?], now: Duration::ZERO, heard, new_points: Vec::new() })
+        let received = VoxelSet::new(Grid::new(RESOLUTION_M, 100.0 * RESOLUTION_M)?);
+        Ok(Self {
+            spotters: [spotter(0)?, spotter(1)?],
+            now: Duration::ZERO,
+            received,
+            new_points: Vec::new(),
+        })
     }
 
-    /// The spotters scan, share, and are heard. `middle_m` is where the travellers are.
+    /// Lets the spotters scan and share. `middle_m` is the mean position of the travellers.
     pub fn step(&mut self, forest: &Forest, middle_m: f64, step: u32) -> Result<()> {
         self.now += STEP;
         for spotter in &mut self.spotters {
             let side = if spotter.number == 0 { -7.0 } else { 7.0 };
-            // One from the back, one from the front: no side of a tree is hidden from both.
+            // One spotter sees the trees from behind, the other from the front, so that both sides are seen.
             let ahead = if spotter.number == 0 { AHEAD_M - 6.0 } else { AHEAD_M + 6.0 };
             let at = [middle_m + ahead, side, SPOTTER_HEIGHT_M];
             let scan = forest.scan(Sensing::SPOTTER, at, u64::from(step) * 2 + spotter.number);
             spotter.map.insert_scan(&scan)?;
             MapWatch::new(0.5)?.take_scan(&spotter.map, &scan, &mut spotter.sender)?;
-            spotter.talk(self.now);
+            spotter.exchange(self.now);
         }
         self.find_new();
         Ok(())
@@ -94,46 +99,46 @@ impl Sharing {
         self.new_points.clear();
         for layer in self.spotters.iter().filter_map(|spotter| spotter.receiver.layer()) {
             for voxel in layer.iter() {
-                if self.heard.put(voxel, true) {
+                if self.received.put(voxel, true) {
                     self.new_points.push(layer.grid().center_m(voxel));
                 }
             }
         }
     }
 
-    /// Bytes a second of both spotters, both ways.
+    /// Bytes per second of both spotters, in both directions.
     pub fn bytes_per_s(&self) -> f64 {
         let bytes: u64 = self.spotters.iter().map(|spotter| spotter.down.bytes + spotter.up.bytes).sum();
         bytes as f64 / self.now.as_secs_f64()
     }
 
-    /// What came of each spotter's map.
+    /// Received voxels of each spotter.
     pub fn layers(&self) -> impl Iterator<Item = &VoxelSet> {
         self.spotters.iter().filter_map(|spotter| spotter.receiver.layer())
     }
 }
 
 impl Spotter {
-    fn talk(&mut self, now: Duration) {
+    fn exchange(&mut self, now: Duration) {
         for packet in self.sender.poll(now) {
             self.down.send(&packet.bytes, now);
         }
-        for ask in self.up.arrived(now) {
-            for packet in self.sender.answer(1, &ask, now).unwrap_or_default() {
+        for request in self.up.arrived(now) {
+            for packet in self.sender.answer(1, &request, now).unwrap_or_default() {
                 self.down.send(&packet.bytes, now);
             }
         }
         for packet in self.down.arrived(now) {
-            // What is damaged is left out.
+            // Damaged packets are ignored.
             let _ = self.receiver.take(&packet, now);
         }
-        for ask in self.receiver.poll(now) {
-            self.up.send(&ask, now);
+        for request in self.receiver.poll(now) {
+            self.up.send(&request, now);
         }
     }
 }
 
-/// A robot that flies to the other end.
+/// A robot that flies to the other end of the forest.
 pub struct Traveller {
     map: LocalMap,
     pub at: Point,
@@ -147,16 +152,16 @@ pub struct Traveller {
 }
 
 const SPEED_M_PER_S: f64 = 3.0;
-/// The paper's planning horizon.
+/// Planning horizon of the paper.
 const HORIZON_M: f64 = 9.5;
 const RADIUS_M: f64 = 0.2;
 const INFLATION_M: f64 = 0.4;
 const HEIGHT_M: f64 = 2.0;
-/// The paper's local maps have 50 000; these see the ground, too.
+/// The paper's local maps have 50 000 voxels; these also contain the ground.
 const MAX_VOXELS: usize = 150_000;
 
 impl Traveller {
-    /// Side by side.
+    /// Four travellers side by side.
     pub fn four() -> Result<Vec<Self>> {
         [-6.0, -2.0, 2.0, 6.0].into_iter().map(Self::new).collect()
     }
@@ -185,13 +190,13 @@ impl Traveller {
         self.planning.as_secs_f64() * 1e3 / f64::from(self.steps.max(1))
     }
 
-    /// Takes over what newly came of the shared maps: hits, and no rays.
-    pub fn hear(&mut self, sharing: &Sharing) -> Result<()> {
+    /// Inserts the newly received voxels as hits, without rays.
+    pub fn receive(&mut self, sharing: &Sharing) -> Result<()> {
         self.map.insert_relayed(self.at, &sharing.new_points).map(drop)
     }
 
-    /// Takes a scan of its own; returns the number of points.
-    pub fn look(&mut self, forest: &Forest, sensing: Sensing, number: u64) -> Result<usize> {
+    /// Inserts its own scan; returns the number of points.
+    pub fn scan(&mut self, forest: &Forest, sensing: Sensing, number: u64) -> Result<usize> {
         let scan = forest.scan(sensing, self.at, number);
         self.map.insert_scan(&scan)?;
         Ok(scan.points.len())
@@ -204,10 +209,10 @@ impl Traveller {
         }
         self.steps += 1;
         let begin = Instant::now();
-        let way = self.way();
+        let plan_path = self.plan_path();
         self.planning += begin.elapsed();
         let mut rest = SPEED_M_PER_S * STEP.as_secs_f64();
-        for &corner in way.iter().skip(1) {
+        for &corner in plan_path.iter().skip(1) {
             let length = distance_m(self.at, corner);
             let part = if length <= rest { 1.0 } else { rest / length };
             let from = self.at;
@@ -223,8 +228,8 @@ impl Traveller {
         self.has_arrived = !self.has_collided && distance_m(self.at, self.goal) < 1.0;
     }
 
-    /// A way towards the goal, as far as the horizon; where the end is not free, to a place beside or before it.
-    fn way(&self) -> Vec<Point> {
+    /// Plans towards the goal, up to the horizon; if that point is not free, to a point next to it or closer.
+    fn plan_path(&self) -> Vec<Point> {
         let distance = distance_m(self.at, self.goal);
         for reach in [1.0, 0.8, 0.6] {
             for aside in [0.0, 1.2, -1.2, 2.4, -2.4, 3.6, -3.6] {
@@ -234,9 +239,9 @@ impl Traveller {
                     to[1] += aside;
                 }
                 if is_free(self.map.view(), to, to)
-                    && let Some(way) = plan(self.map.view(), self.at, to)
+                    && let Some(plan_path) = plan(self.map.view(), self.at, to)
                 {
-                    return way;
+                    return plan_path;
                 }
             }
         }

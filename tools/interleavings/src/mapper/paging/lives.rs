@@ -1,4 +1,4 @@
-//! Lives of the mapper's tiles in little memory: what is in use, packed, on its way to disk and from there.
+//! Random operations on the mapper's tiles in little memory: resident, packed, being saved and being loaded.
 
 use super::memory_disk::MemoryDisk;
 use super::paged_tiles::PagedTiles;
@@ -18,22 +18,22 @@ use voxtile::tile::Voxel;
 const TILES: i32 = 8;
 const TILE_M: f64 = 4.0;
 
-/// The tiles of a map under way, and what they must be.
+/// The tiles of a map, and their expected contents.
 struct Life {
     tiles: PagedTiles,
     disk: MemoryDisk,
     config: MapConfig,
-    /// Every tile, in memory and beyond doubt.
+    /// All tiles, kept in memory.
     expected: BTreeMap<TileIndex, Tile>,
-    /// The same as of the last flush.
+    /// The tiles as of the last flush.
     flushed: BTreeMap<TileIndex, Tile>,
-    /// The same as of flushes that were begun beside the mapper, by the number of batches.
+    /// The tiles as of each background flush that has begun, by the number of batches.
     begun: BTreeMap<u64, BTreeMap<TileIndex, Tile>>,
-    /// That of the one that goes on.
-    flying: Option<u64>,
-    /// Whether flushes go on beside the mapper.
-    is_beside: bool,
-    /// How often each tile was to be changed or was asked for.
+    /// The background flush that is still running.
+    running: Option<u64>,
+    /// Whether flushes run in the background.
+    in_background: bool,
+    /// Number of times each tile was changed or queried.
     touched: BTreeMap<TileIndex, u64>,
     errors: u64,
 }
@@ -47,16 +47,27 @@ fn voxels(tile: &Tile) -> Vec<Voxel> {
 }
 
 impl Life {
-    fn new(storage: Storage, is_beside: bool) -> Self {
+    fn new(storage: Storage, in_background: bool) -> Self {
         let (disk, config, map_id) = (MemoryDisk::new(), config(storage), new_map_id());
         let metadata = new_metadata(&config, map_id, &[]);
         let store = TileStore::create(Arc::new(disk.clone()), Path::new("/map"), metadata, map_id).unwrap();
         let tiles = PagedTiles::new(config.clone(), store);
         let (expected, flushed, begun, touched) = Default::default();
-        Self { tiles, disk, config, expected, flushed, begun, flying: None, is_beside, touched, errors: 0 }
+        Self {
+            tiles,
+            disk,
+            config,
+            expected,
+            flushed,
+            begun,
+            running: None,
+            in_background,
+            touched,
+            errors: 0,
+        }
     }
 
-    /// A batch of points in some tiles: taken whole, or refused and nothing of it taken.
+    /// Inserts a batch of points in some tiles, which is accepted or refused as a whole.
     fn insert(&mut self) {
         let mut random = thread_rng();
         let first = random.gen_range(0..TILES);
@@ -84,8 +95,8 @@ impl Life {
         self.tiles.pager().accept(updates);
     }
 
-    /// Asks for a tile, wherever it is.
-    fn ask(&mut self) {
+    /// Queries a tile.
+    fn query(&mut self) {
         let index = TileIndex::new(thread_rng().gen_range(0..TILES), 0, 0);
         self.touch(index);
         match self.tiles.pager().tile(index) {
@@ -101,38 +112,38 @@ impl Life {
     }
 
     fn flush(&mut self, refuses: bool) {
-        // Whatever came of one beside the mapper, this one tells it.
-        self.flying = None;
+        // This flush reports the error of an earlier background flush.
+        self.running = None;
         match self.tiles.pager().flush() {
             Ok(()) => {
                 self.flushed = self.expected.clone();
                 self.begun.clear();
             }
             Err(error) => {
-                // What could not be saved before is saved now, and no older trouble is told of.
+                // Tiles that could not be saved before are saved now, and older errors are not reported again.
                 assert!(refuses, "{error:#}");
                 self.errors += 1;
             }
         }
     }
 
-    /// Begins a flush that goes on beside what comes next.
+    /// Begins a background flush.
     fn begin_flush(&mut self) {
         let number = self.tiles.pager().scan_number();
         match self.tiles.begin_flush() {
             Ok(()) => {
                 self.begun.insert(number, self.expected.clone());
-                self.flying = Some(number);
+                self.running = Some(number);
             }
             Err(_) => {
-                (self.errors, self.flying) = (self.errors + 1, None);
+                (self.errors, self.running) = (self.errors + 1, None);
             }
         }
     }
 
     fn end_flush(&mut self) {
-        let flying = self.flying.take();
-        match (self.tiles.end_flush(), flying) {
+        let running = self.running.take();
+        match (self.tiles.end_flush(), running) {
             (Ok(()), Some(number)) => {
                 assert_eq!(self.tiles.pager().store().commits().scan_number, number);
                 self.flushed = self.begun.remove(&number).expect("it was begun");
@@ -143,20 +154,21 @@ impl Life {
         }
     }
 
-    /// Goes away in the middle of everything, and begins again with what was flushed.
-    fn begin_again(self) -> Self {
-        let Self { tiles, disk, config, mut flushed, begun, flying, is_beside, touched, errors, .. } = self;
+    /// Drops the map at any point and opens it as of the last flush.
+    fn reopen(self) -> Self {
+        let Self { tiles, disk, config, mut flushed, begun, running, in_background, touched, errors, .. } =
+            self;
         drop(tiles);
         let store = TileStore::open(Arc::new(disk.clone()), Path::new("/map")).unwrap();
         let committed = store.commits().scan_number;
-        // What goes on when the mapper goes is finished, unless the disk refuses.
-        assert!(flying.is_none_or(|number| number == committed || disk.refused() > 0), "{committed}");
+        // Dropping the mapper completes a running flush, unless the disk refuses.
+        assert!(running.is_none_or(|number| number == committed || disk.refused() > 0), "{committed}");
         if let Some(begun) = begun.get(&committed) {
             flushed = begun.clone();
         }
         let tiles = PagedTiles::new(config.clone(), store);
         let (expected, begun) = (flushed.clone(), BTreeMap::new());
-        Self { tiles, disk, config, expected, flushed, begun, flying: None, is_beside, touched, errors }
+        Self { tiles, disk, config, expected, flushed, begun, running: None, in_background, touched, errors }
     }
 
     fn run(&mut self, steps: usize) {
@@ -165,10 +177,10 @@ impl Life {
         for _ in 0..steps {
             match thread_rng().gen_range(0..16) {
                 0..8 => self.insert(),
-                8 if self.is_beside => self.begin_flush(),
+                8 if self.in_background => self.begin_flush(),
                 8 => self.insert(),
-                9 if self.is_beside && thread_rng().gen_bool(0.3) => self.end_flush(),
-                9..13 => self.ask(),
+                9 if self.in_background && thread_rng().gen_bool(0.3) => self.end_flush(),
+                9..13 => self.query(),
                 13 => self.flush(refuses),
                 _ => {
                     refuses = !refuses && thread_rng().gen_bool(0.5);
@@ -176,11 +188,11 @@ impl Life {
                 }
             }
         }
-        // A refusal is told of once, if at all: a tile that is saved the next time is no trouble.
+        // An error is reported at most once: a tile that is saved by a retry is no error.
         assert!(self.errors <= self.disk.refused(), "{} errors", self.errors);
     }
 
-    /// Nothing goes to disk more often than it was changed or wanted.
+    /// No tile is written more often than it was changed or queried.
     fn check_saves(&self) {
         let layout = self.tiles.pager().store().layout().clone();
         for (index, touched) in &self.touched {
@@ -198,44 +210,44 @@ impl Life {
     }
 }
 
-fn live(storage: Storage, is_beside: bool) {
-    let mut life = Life::new(storage, is_beside);
+fn run_life(storage: Storage, in_background: bool) {
+    let mut life = Life::new(storage, in_background);
     for _ in 0..2 {
         life.run(24);
         life.check_tiles();
-        if !life.is_beside {
+        if !life.in_background {
             life.check_saves();
         }
-        life = life.begin_again();
+        life = life.reopen();
         life.check_tiles();
     }
     life.disk.refuse(false);
     life.insert();
     life.flush(false);
-    life.begin_again().check_tiles();
+    life.reopen().check_tiles();
 }
 
-/// Scans, questions, flushes and a disk that refuses now and then: no update is lost, none counts twice, no older
-/// version of a tile comes after a newer, and nobody waits for ever.
+/// Inserts, queries and flushes on a disk that sometimes refuses: no update is lost or counted twice, no older version
+/// of a tile replaces a newer one, and there is no deadlock.
 #[test]
-fn tiles_on_their_way_to_disk_and_back_are_what_they_must_be() {
-    in_many_orders(|| live(Storage::Compact, false));
+fn tiles_keep_their_contents_while_saved_and_loaded() {
+    in_many_orders(|| run_life(Storage::Compact, false));
 }
 
-/// The same where the saving thread unpacks tiles.
+/// The same if the saving thread unpacks tiles.
 #[test]
-fn tiles_that_are_unpacked_on_their_way_are_too() {
-    in_many_orders(|| live(Storage::OctoMap, false));
+fn tiles_unpacked_by_the_saving_thread_keep_their_contents() {
+    in_many_orders(|| run_life(Storage::OctoMap, false));
 }
 
-/// The same with flushes that go on beside scans, questions and whatever ends the mapper: what is on disk afterwards is
-/// the map as of one of them.
+/// The same with background flushes during inserts, queries and the drop of the map: the map on disk is that of one of
+/// the flushes.
 #[test]
-fn flushes_beside_the_mapper_are_of_one_scan() {
-    in_many_orders(|| live(Storage::Compact, true));
+fn a_background_flush_saves_the_map_as_of_one_scan() {
+    in_many_orders(|| run_life(Storage::Compact, true));
 }
 
 #[test]
-fn flushes_beside_the_mapper_that_unpack_tiles_are_too() {
-    in_many_orders(|| live(Storage::OctoMap, true));
+fn a_background_flush_that_unpacks_tiles_saves_the_map_as_of_one_scan() {
+    in_many_orders(|| run_life(Storage::OctoMap, true));
 }

@@ -4,7 +4,7 @@ use std::io::{self, Cursor, ErrorKind, Read, Write};
 use std::path::{Path, PathBuf};
 use voxtile::store::{Disk, DiskLock, DiskRead, DiskWrite, EntryKind, ReaderWatch, Scratch};
 
-/// A disk in memory, each operation of which lets others go on; it refuses new files of tiles when it is told to.
+/// A disk in memory that yields to other threads at each operation, and can refuse new files of tiles.
 #[derive(Clone, Debug)]
 pub(super) struct MemoryDisk {
     state: Arc<Mutex<State>>,
@@ -15,11 +15,11 @@ struct State {
     names: BTreeMap<PathBuf, Entry>,
     refuses: bool,
     refused: u64,
-    /// How often each new file of a tile was begun.
+    /// Number of times each new file of a tile was begun.
     begun: BTreeMap<PathBuf, u64>,
 }
 
-/// Nothing waits while it holds a content, so that the scheduler need not know of it.
+/// No thread waits while it holds this lock, so the scheduler does not need to control it.
 type Content = std::sync::Arc<std::sync::Mutex<Vec<u8>>>;
 
 #[derive(Clone, Debug)]
@@ -29,23 +29,23 @@ enum Entry {
 }
 
 impl MemoryDisk {
-    /// An empty disk with a folder `/`.
+    /// Creates an empty disk with the folder `/`.
     pub(super) fn new() -> Self {
         let names = BTreeMap::from([(PathBuf::from("/"), Entry::Folder)]);
         Self { state: Arc::new(Mutex::new(State { names, ..State::default() })) }
     }
 
-    /// Begins or ceases to refuse new files of tiles.
+    /// Sets whether new files of tiles are refused.
     pub(super) fn refuse(&self, refuses: bool) {
         self.lock().refuses = refuses;
     }
 
-    /// How often it has refused.
+    /// Number of refused files.
     pub(super) fn refused(&self) -> u64 {
         self.lock().refused
     }
 
-    /// How often a file was begun.
+    /// Number of times a file was begun.
     pub(super) fn begun(&self, path: &Path) -> u64 {
         self.lock().begun.get(path).copied().unwrap_or_default()
     }
@@ -95,15 +95,15 @@ impl DiskWrite for Writing {
     }
 }
 
-struct Nobody;
+struct SingleProcess;
 
-impl ReaderWatch for Nobody {
+impl ReaderWatch for SingleProcess {
     fn has_readers(&self) -> bool {
         false
     }
 }
 
-impl DiskLock for Nobody {
+impl DiskLock for SingleProcess {
     fn is_in_place(&self) -> io::Result<bool> {
         Ok(true)
     }
@@ -120,7 +120,7 @@ impl Disk for MemoryDisk {
     }
 
     fn watch(&self, _: &Path) -> io::Result<Box<dyn ReaderWatch>> {
-        Ok(Box::new(Nobody))
+        Ok(Box::new(SingleProcess))
     }
 
     fn create(&self, path: &Path) -> io::Result<Box<dyn DiskWrite>> {
@@ -191,6 +191,6 @@ impl Disk for MemoryDisk {
 
     fn lock(&self, path: &Path) -> io::Result<Option<Box<dyn DiskLock>>> {
         self.lock().names.entry(path.to_owned()).or_insert(Entry::File(Content::default()));
-        Ok(Some(Box::new(Nobody)))
+        Ok(Some(Box::new(SingleProcess)))
     }
 }

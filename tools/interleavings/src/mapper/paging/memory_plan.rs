@@ -1,7 +1,6 @@
 use crate::config::MapConfig;
 
-/// How much memory lives have: room for two or three tiles in use and for as many that are packed, so that tiles are on
-/// their way all the time.
+/// Memory for two or three tiles in use and as many packed ones, so that tiles are saved and loaded all the time.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::mapper) struct MemoryPlan {
     pub(super) tiles: usize,
@@ -36,7 +35,7 @@ impl MemoryPlan {
         self.compact_bytes > 0
     }
 
-    /// The few tiles here have a small index, which takes from no share.
+    /// Does nothing: the index of these few tiles is small.
     pub(super) fn note_index(&mut self, _: usize) {}
 
     pub(super) fn buffer_bytes(&self) -> usize {

@@ -2,7 +2,7 @@ use super::contents::TileContents;
 use shuttle::sync::{Mutex, MutexGuard};
 use std::ops::{Deref, DerefMut};
 
-/// The contents behind the scheduler's lock, which knows no way to let go of a guard for a while.
+/// The contents behind a lock of the scheduler, whose guards cannot be released temporarily.
 #[derive(Debug)]
 pub(in crate::mapper) struct SharedContents(Mutex<TileContents>);
 
@@ -28,13 +28,13 @@ impl Deref for ContentsGuard<'_> {
     type Target = TileContents;
 
     fn deref(&self) -> &TileContents {
-        self.guard.as_ref().expect("nobody looks while it is unlocked")
+        self.guard.as_ref().expect("contents are accessed only while locked")
     }
 }
 
 impl DerefMut for ContentsGuard<'_> {
     fn deref_mut(&mut self) -> &mut TileContents {
-        self.guard.as_mut().expect("nobody looks while it is unlocked")
+        self.guard.as_mut().expect("contents are accessed only while locked")
     }
 }
 

@@ -2,7 +2,7 @@ use super::tile_disk::TileDisk;
 use shuttle::sync::{Mutex, MutexGuard};
 use std::ops::{Deref, DerefMut};
 
-/// The disk behind the scheduler's lock, which knows no way to let go of a guard for a while.
+/// The disk behind a lock of the scheduler, whose guards cannot be released temporarily.
 #[derive(Debug)]
 pub(super) struct SharedDisk(Mutex<TileDisk>);
 
@@ -26,13 +26,13 @@ impl Deref for DiskGuard<'_> {
     type Target = TileDisk;
 
     fn deref(&self) -> &TileDisk {
-        self.guard.as_ref().expect("nobody looks while it is unlocked")
+        self.guard.as_ref().expect("the disk is accessed only while locked")
     }
 }
 
 impl DerefMut for DiskGuard<'_> {
     fn deref_mut(&mut self) -> &mut TileDisk {
-        self.guard.as_mut().expect("nobody looks while it is unlocked")
+        self.guard.as_mut().expect("the disk is accessed only while locked")
     }
 }
 

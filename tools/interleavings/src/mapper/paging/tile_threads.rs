@@ -1,7 +1,7 @@
 use std::path::Path;
 use voxtile::Result;
 
-/// One thread: the scheduler knows none of rayon's.
+/// Runs work on the calling thread: the scheduler does not support rayon.
 #[derive(Clone, Debug, Default)]
 pub(super) struct TileThreads(());
 

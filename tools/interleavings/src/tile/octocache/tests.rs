@@ -7,8 +7,8 @@ use crate::space::MortonCode;
 use shuttle::sync::{Arc, Mutex};
 use shuttle::thread;
 
-/// Two threads put in more than there is room for: all of it is done, each thread's in its order, and who ends the
-/// worker waits for that.
+/// Two threads push more than the queue holds: all jobs are done, those of each thread in order, before the drop of the
+/// worker returns.
 #[test]
 fn all_jobs_are_done_in_order_before_the_worker_ends() {
     in_many_orders(|| {
@@ -38,13 +38,13 @@ fn all_jobs_are_done_in_order_before_the_worker_ends() {
         let counts = queue.counts();
         assert_eq!((counts.batches_in, counts.batches_out), (8, 8));
         assert_eq!((counts.voxels_in, counts.voxels_out), (30, 30));
-        assert!(queue.push(1, Box::new(|| ())).is_err(), "a closed queue takes nothing");
+        assert!(queue.push(1, Box::new(|| ())).is_err(), "a closed queue refuses jobs");
     });
 }
 
-/// A queue that is closed while somebody waits for room: the job comes back or is done, and nobody waits for ever.
+/// A queue is closed while a thread waits for space: the job is returned or done, and there is no deadlock.
 #[test]
-fn nobody_waits_for_a_closed_queue() {
+fn a_closed_queue_wakes_waiting_threads() {
     in_many_orders(|| {
         let done = Arc::new(Mutex::new(0));
         let worker = OctreeWorker::start(1, Arc::new(OctreeLedger::default())).unwrap();
@@ -66,7 +66,7 @@ fn nobody_waits_for_a_closed_queue() {
 
 const VOXEL: MortonCode = MortonCode(77);
 
-/// What the tree and what is in pinned say of the voxel together; nothing while the tree is being written.
+/// Value of the voxel in the tree and in the updates in flight; none while the tree is being written.
 fn value_of(tree: &SharedTree) -> Option<f32> {
     tree.try_read(|tree, in_flight| {
         let latest = in_flight.iter().flatten().rfind(|(code, _)| *code == VOXEL);
@@ -74,7 +74,7 @@ fn value_of(tree: &SharedTree) -> Option<f32> {
     })
 }
 
-/// One thread maps, the worker writes, one syncs, one asks: nobody sees an older value after a newer one, or none.
+/// One thread maps, the worker writes, one thread syncs, one queries: no query sees an older value after a newer one.
 #[test]
 fn no_update_of_a_tree_is_lost_or_seen_out_of_order() {
     in_many_orders(|| {
@@ -101,7 +101,7 @@ fn no_update_of_a_tree_is_lost_or_seen_out_of_order() {
                 Box::new(move || assert!(tree.write_all().is_some()))
             };
             assert!(worker.queue().push(2, job).is_ok());
-            // Own updates are there at once, unless the tree is being written.
+            // Own updates are visible at once, unless the tree is being written.
             assert!(value_of(&tree).is_none_or(|value| value == f32::from(number)));
         }
         syncs.join().unwrap();
@@ -112,9 +112,9 @@ fn no_update_of_a_tree_is_lost_or_seen_out_of_order() {
     });
 }
 
-/// A copy of a tree has all that was sent to the tree before, and a tree that is replaced nothing of what was.
+/// A copy of a tree has all earlier updates, and a replaced tree has none of them.
 #[test]
-fn a_copy_has_everything_and_a_replaced_tree_nothing_of_before() {
+fn a_copy_has_all_updates_and_a_replaced_tree_has_none() {
     in_many_orders(|| {
         let tree = Arc::new(SharedTree::new(Octree::new()));
         tree.send(vec![(VOXEL, 1.0)]);

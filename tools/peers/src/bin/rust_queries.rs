@@ -1,11 +1,11 @@
-//! The work of `python/benchmarks/beside_rust.py`, asked from Rust: the same scans into a map, the same questions.
+//! The measurements of `python/benchmarks/beside_rust.py` from Rust: the same scans into a map, the same queries.
 //!
 //! ```text
-//! asked_from_rust WORK FOLDER
+//! rust_queries WORK FOLDER
 //! ```
 //!
-//! WORK is what the script wrote, all little-endian `f64` but the points of scans, which are `f32`; numbers are `u64`.
-//! Prints CPU seconds as JSON.
+//! WORK is written by the script: little-endian `f64`, except the points of scans, which are `f32`, and counts, which
+//! are `u64`. Prints CPU seconds as JSON.
 
 use anyhow::{Context, Result, bail};
 use report::Stopwatch;
@@ -21,7 +21,7 @@ const MEMORY_BYTES: usize = 512 << 20;
 const MAX_RANGE_M: f64 = 40.0;
 const FROM: Point = [15.0, 10.0, 1.5];
 
-/// Scans, points to ask about, directions of rays.
+/// Scans, points to query, and directions of rays.
 struct Work {
     scans: Vec<(Point, Vec<[f32; 3]>)>,
     places: Vec<Point>,
@@ -31,7 +31,7 @@ struct Work {
 fn main() -> Result<()> {
     let mut args = args_os().skip(1);
     let (Some(work), Some(folder)) = (args.next(), args.next()) else {
-        bail!("usage: asked_from_rust WORK FOLDER");
+        bail!("usage: rust_queries WORK FOLDER");
     };
     let work = Work::read(&fs::read(&work).with_context(|| format!("{}", work.display()))?)?;
     let folder = Path::new(&folder);
@@ -47,7 +47,7 @@ fn main() -> Result<()> {
     let flush = watch.stop()?.cpu_s();
     drop(mapper);
     let reader = MapOptions::new().memory_bytes(MEMORY_BYTES).open_read_only(folder)?;
-    // Everything is in memory from here on.
+    // Warms up: all tiles are in memory from here on.
     black_box(reader.occupancy_at_points(&work.places)?);
     let watch = Stopwatch::start()?;
     black_box(reader.occupancy_at_points(&work.places)?);
@@ -107,7 +107,7 @@ fn point(bytes: &[u8]) -> Point {
 }
 
 fn take<'a>(rest: &mut &'a [u8], bytes: usize) -> Result<&'a [u8]> {
-    let (taken, left) = rest.split_at_checked(bytes).context("the file of work is too short")?;
+    let (taken, left) = rest.split_at_checked(bytes).context("WORK is too short")?;
     *rest = left;
     Ok(taken)
 }
