@@ -1,4 +1,4 @@
-"""Pushes, reads and pulls a map with servers that are slow, fail and cut off: `check.py VOXTILE MAP FOLDER`."""
+"""Pushes, reads and pulls a map through slow, failing and interrupted connections: `check.py VOXTILE MAP FOLDER`."""
 
 import http.client
 import json
@@ -142,7 +142,7 @@ def check(port):
         voxtile("export", map, "-o", WORK / name, port=port)
     assert (WORK / "here.ply").read_bytes() == (WORK / "there.ply").read_bytes()
     assert json.loads(voxtile("info", url, "--json", port=port))["tiles"] == first["tiles"]
-    print("read there: digest, query, raycast, verify, export, info")
+    print("read from the bucket: digest, query, raycast, verify, export, info")
 
     # Missing maps and writing commands fail.
     assert "no map here" in voxtile("info", "s3://robots/maps/none", port=port, fails=True)
@@ -163,7 +163,7 @@ def check(port):
     assert replaced["files_fetched"] < replaced["files"] / 2, replaced
     digest = voxtile("digest", WORK / "behind", port=port)
     assert digest == voxtile("digest", url, port=port) == voxtile("digest", WORK / "pulled", port=port)
-    print("pushed and pulled what changed:", replaced["files_fetched"], "of", replaced["files"], "files")
+    print("changed files pushed and pulled:", replaced["files_fetched"], "of", replaced["files"], "files")
 
     # A slow, failing and interrupted network.
     Proxy.behind = ("127.0.0.1", port)
@@ -205,7 +205,7 @@ def check(port):
     voxtile("push", WORK / "pulled", url, "--resend", port=port)
     assert voxtile("digest", url, port=port) == digest
     voxtile("verify", url, port=port)
-    print("and sent again with --resend")
+    print("damaged objects sent again with --resend")
 
     check_scans(s3, port, bad)
 

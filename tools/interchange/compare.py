@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Checks that each point that another program read from a file is in its voxel of the map.
 
-    compare.py MAP.csv RESOLUTION FILE WHO [--any-order] < POINTS
+    compare.py MAP.csv RESOLUTION FILE PROGRAM [--any-order] < POINTS
 
 MAP.csv is the map's export without an origin; FILE.origin.json, if it exists, has the offset of FILE's
 points. A line `# origin X Y Z` before the points (from a PCD's VIEWPOINT) must match it. Needs only Python.
@@ -14,7 +14,7 @@ import sys
 
 
 def main():
-    table, resolution, path, who = sys.argv[1], float(sys.argv[2]), sys.argv[3], sys.argv[4]
+    table, resolution, path, program = sys.argv[1], float(sys.argv[2]), sys.argv[3], sys.argv[4]
 
     def voxel(point):
         return tuple(math.floor(x / resolution) for x in point)
@@ -29,7 +29,7 @@ def main():
         if words[:2] == ["#", "origin"]:
             reported = [float(x) for x in words[2:5]]
             if reported != origin:
-                sys.exit(f"{who}: {path}: the reported origin is {reported}, not {origin}")
+                sys.exit(f"{program}: {path}: the reported origin is {reported}, not {origin}")
         elif words and not words[0].startswith(("#", "/")):
             point = [float(x) + o for x, o in zip(words[:3], origin)]
             found.append(voxel(point))
@@ -38,12 +38,12 @@ def main():
         expected.sort()
         found.sort()
     if len(found) != len(expected):
-        sys.exit(f"{who}: {path}: {len(found)} points, the map has {len(expected)} occupied voxels")
+        sys.exit(f"{program}: {path}: {len(found)} points, the map has {len(expected)} occupied voxels")
     wrong = sum(a != b for a, b in zip(found, expected))
     if wrong or not found:
-        sys.exit(f"{who}: {path}: {wrong} of {len(found)} points are not in their voxel")
+        sys.exit(f"{program}: {path}: {wrong} of {len(found)} points are not in their voxel")
     name = pathlib.Path(path).name
-    print(f"{who:12} {name:14} {len(found):8} points, each in its voxel; at most {worst:.5f} voxels from its center")
+    print(f"{program:12} {name:14} {len(found):8} points, each in its voxel; at most {worst:.5f} voxels from its center")
 
 
 if __name__ == "__main__":

@@ -190,9 +190,9 @@ def exposed_faces(voxels):
     for x, y, z in occupied:
         for axis in range(3):
             for side in (-1, 1):
-                beside = [x, y, z]
-                beside[axis] += side
-                if tuple(beside) not in occupied:
+                neighbour = [x, y, z]
+                neighbour[axis] += side
+                if tuple(neighbour) not in occupied:
                     normal = tuple(side if k == axis else 0 for k in range(3))
                     faces.add(((x, y, z), normal))
     return faces

@@ -69,7 +69,7 @@ def record(stream, folder):
     with Writer(folder / "drive.bag") as bag:
         clouds = bag.add_connection("/points", kind, typestore=ros.store)
         for stamp_ns, yaw, xyz, intensity in zip(stamps, yaws, points, intensities):
-            # The stream's points are in the axes of the world; the sensor turns with the vehicle.
+            # The stream's points have world axes; the sensor turns with the vehicle.
             in_sensor = xyz.astype(float) @ turn(yaw)
             bag.write(clouds, stamp_ns, ros.serialize(ros.cloud(stamp_ns, in_sensor, intensity), kind))
     (folder / "true_tum.txt").write_text("".join(map(tum, stamps, positions, yaws)))
@@ -97,7 +97,7 @@ def align(true, found, aligned):
     distance_m = np.linalg.norm(np.diff(true[:, :3, 3], axis=0), axis=1).sum()
     turned = np.trace(np.swapaxes(true[:, :3, :3], 1, 2) @ found[:, :3, :3], axis1=1, axis2=2)
     off_deg = np.degrees(np.arccos(np.clip((turned - 1) / 2, -1, 1)))
-    print(f"poses: off by {off_m.mean():.3f} m in the mean, {off_m.max():.3f} m at most, ", end="")
+    print(f"poses: off by {off_m.mean():.3f} m on average, {off_m.max():.3f} m at most, ", end="")
     print(f"{off_deg.max():.2f} degrees at most; ", end="")
     print(f"{off_m[-1]:.3f} m after {distance_m:.0f} m, that is {off_m[-1] / distance_m:.2%}")
     return off_m[-1] > MAX_DRIFT * distance_m

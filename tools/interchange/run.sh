@@ -39,7 +39,7 @@ compare() { # table, file, program, options; reads points from standard input
     python3 "$here/compare.py" "$1" $resolution "$2" "$3" ${4-} || failed=1
 }
 
-# Builds a map far from the origin: the occupied voxels of the near map, seen from above.
+# Builds a map far from the origin, from the occupied voxels of the near map and a PCD viewpoint at x, y, z.
 far_map() { # name, x, y, z
     cloud=$work/$1.pcd
     {

@@ -25,7 +25,7 @@ static bool read_scan(std::istream& in, octomap::point3d& origin, octomap::Point
   cloud.clear();
   cloud.reserve(count);
   for (uint32_t i = 0; i <= count; ++i) {
-    if (!read_floats(in, xyz, 3)) throw std::runtime_error("the stream of scans ends in a scan");
+    if (!read_floats(in, xyz, 3)) throw std::runtime_error("the stream of scans ends within a scan");
     const octomap::point3d point(xyz[0], xyz[1], xyz[2]);
     if (i == 0) origin = point;
     else cloud.push_back(point);

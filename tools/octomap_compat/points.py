@@ -22,7 +22,7 @@ def points_of(path):
         key, *values = data[at:end].decode("ascii").split() or [""]
         header[key], at = values, end + 1
     if header["DATA"] != ["binary"]:
-        sys.exit(f"{path}: only binary PCD is read")
+        sys.exit(f"{path}: only binary PCD is supported")
     kinds = {("F", "4"): "f", ("F", "8"): "d", ("U", "1"): "B", ("U", "2"): "H", ("U", "4"): "I"}
     counts = header.get("COUNT", ["1"] * len(header["FIELDS"]))
     kinds = [c + kinds[kind] for kind, c in zip(zip(header["TYPE"], header["SIZE"]), counts)]

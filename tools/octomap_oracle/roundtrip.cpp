@@ -41,8 +41,8 @@ static void grow(OcTree& tree, std::mt19937& random, bool pruned) {
           if (kind == 1) tree.updateNode(key, below(3) == 0, true);
           if (kind == 2) for (int i = 0; i < 8; ++i) tree.updateNode(key, value > 0, !pruned);
           if (kind == 3 && below(8) != 0) tree.setNodeValue(key, float(below(4)) * 0.4f, !pruned);
-          // Small occupied cubes of equal voxels that differ from each other: how much OctoMap prunes depends on
-          // whether any voxels can be pruned.
+          // Cubes of 2 x 2 x 2 equal occupied voxels, each cube with another value: how much OctoMap prunes depends on
+          // whether there is something to prune among the voxels.
           if (kind == 4) tree.setNodeValue(key, 1.0f + float(x / 2 + 8 * (y / 2) + 64 * (z / 2)), false);
         }
   }
@@ -89,7 +89,7 @@ static int own(const std::string& folder) {
       ++differing;
     }
   }
-  std::cout << "OctoMap reads " << n << " pairs of ours, " << differing << " differ\n";
+  std::cout << "OctoMap rewrites " << n << " pairs of voxtile files, " << differing << " differ\n";
   return differing != 0 || n == 0;
 }
 

@@ -25,5 +25,5 @@ while [ "$n" -lt "$count" ]; do
     cmp "$tree.expected.bt" "$tree.ours.bt"
     n=$((n + 1))
 done
-echo "$count trees of OctoMap: our .ot and our .bt are the same bytes"
+echo "$count trees of OctoMap: voxtile writes the same .ot and .bt bytes"
 "$work/roundtrip" own "$work" 2>"$work/octomap.log"

@@ -119,7 +119,7 @@ static double wall_s() {
 
 static double cpu_s() {
   timespec time;
-  if (clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &time) != 0) throw std::runtime_error("there is no CPU clock");
+  if (clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &time) != 0) throw std::runtime_error("the CPU clock cannot be read");
   return double(time.tv_sec) + 1e-9 * double(time.tv_nsec);
 }
 

@@ -17,11 +17,8 @@ use voxtile::{InMemoryMapper, MapPath, MapQueries, MapReader, Mapper, OutOfCoreT
 pub struct Build {
     /// Scans and map settings.
     pub case: Case,
-    /// Memory limit.
     pub limit: Limit,
-    /// Disk speed.
     pub disk: DiskSpeed,
-    /// Storage of the tiles.
     pub storage: Storage,
     /// Number of scans that are generated or read before they are inserted one after another. The wall time excludes
     /// work that other threads do while scans are generated.
@@ -47,7 +44,6 @@ pub struct Flushes {
     pub is_background: bool,
 }
 
-/// Result of a build.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct Built {
     /// Cost of each scan, in order.
@@ -60,7 +56,6 @@ pub struct Built {
     pub start_resident_bytes: u64,
     /// Largest resident memory of the process until the end of the flush, in bytes.
     pub peak_resident_bytes: u64,
-    /// Tiles of the map.
     pub tiles: u64,
     /// Bytes of the tiles in memory after the last scan.
     pub tile_bytes: u64,
@@ -128,7 +123,7 @@ impl Build {
         Ok(built)
     }
 
-    /// `flush` starts or does a flush, and returns whether it did.
+    /// Inserts all scans. `flush` returns whether it flushed.
     fn insert_all<M: Mapper>(
         &self,
         mapper: &mut M,
@@ -199,7 +194,7 @@ impl Built {
         self.scans.iter().map(|scan| scan.cpu_ms).sum::<f64>() / 1e3 + self.flush_cpu_s
     }
 
-    /// Bytes written to the disk by bytes of the map's files.
+    /// Ratio of the bytes written to the disk to those of the map's files.
     pub fn written_by_map(&self) -> f64 {
         self.bytes_written as f64 / self.map_file_bytes as f64
     }
@@ -237,7 +232,7 @@ impl Odometer {
 fn replace_folder(folder: &Path) -> Result<()> {
     remove_folder(folder)?;
     let parent = folder.parent().unwrap_or(folder);
-    fs::create_dir_all(parent).with_context(|| format!("{}: cannot make the folder", parent.display()))
+    fs::create_dir_all(parent).with_context(|| format!("{}: cannot create the folder", parent.display()))
 }
 
 /// Removes a folder with its content, if it exists.

@@ -10,47 +10,35 @@ use workload::SurveyName;
 pub struct Case {
     /// Name in tables and plots.
     pub name: String,
-    /// Source of the scans.
     pub input: Input,
-    /// Edge of a voxel, in metres.
     pub resolution_m: f64,
-    /// Edge of a tile, in metres.
     pub tile_size_m: f64,
     /// Maximum range: longer rays are cut, in metres.
     pub max_range_m: f64,
 }
 
-/// Source of scans.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub enum Input {
     /// From a synthetic survey.
     Synthetic {
-        /// The survey.
         survey: SurveyName,
         /// Approximate number of rays of a scan.
         rays: u32,
-        /// Number of scans.
         scans: usize,
     },
     /// Every n-th scan of a synthetic survey.
     EveryNth {
-        /// The survey.
         survey: SurveyName,
         /// Approximate number of rays of a scan.
         rays: u32,
-        /// Number of scans.
         scans: usize,
         /// Step between used scans of the survey.
         every: usize,
     },
     /// From a folder of recorded scans and poses.
-    Recorded {
-        /// The folder.
-        folder: PathBuf,
-    },
+    Recorded { folder: PathBuf },
 }
 
-/// Memory limit of a map.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Limit {
     /// The map is in memory and is never written to disk.
@@ -61,7 +49,6 @@ pub enum Limit {
     Bytes(usize),
 }
 
-/// Seed of the synthetic surveys.
 const SEED: u64 = 1;
 /// Larger than any map here.
 const UNLIMITED_BYTES: usize = 1 << 44;
@@ -86,12 +73,12 @@ impl Case {
     /// # Errors
     ///
     /// As for [`Case::config`].
-    pub fn least_bytes(&self) -> Result<usize> {
+    pub fn min_bytes(&self) -> Result<usize> {
         Ok(MemoryLimit::min_bytes(&self.config(Limit::InMemory)?.grid))
     }
 
     /// Returns whether the scans follow a trajectory, so that its length measures progress.
-    pub fn is_way(&self) -> bool {
+    pub fn follows_trajectory(&self) -> bool {
         match &self.input {
             Input::Synthetic { survey, .. } | Input::EveryNth { survey, .. } => survey.spacing_m().is_some(),
             Input::Recorded { .. } => true,
@@ -126,7 +113,6 @@ impl Case {
         }
     }
 
-    /// Description of the scans and the map.
     pub fn description(&self) -> String {
         let input = match &self.input {
             Input::Synthetic { survey, rays, scans } => match survey.spacing_m() {
@@ -163,7 +149,7 @@ mod tests {
         let scans: Vec<Scan> = drive.scans().unwrap().collect::<Result<_>>().unwrap();
         assert_eq!(scans.len(), 3);
         assert!(scans.iter().all(|scan| !scan.points.is_empty() && scan.intensities.is_none()));
-        assert!(drive.is_way() && drive.least_bytes().unwrap() > 0);
+        assert!(drive.follows_trajectory() && drive.min_bytes().unwrap() > 0);
         let input = Input::Recorded { folder: PathBuf::from("nowhere") };
         assert!(Case { input, ..drive }.scans().is_err());
     }

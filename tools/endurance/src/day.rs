@@ -11,7 +11,6 @@ use voxtile::{MapReader, MapView, Mapper, OutOfCoreTileMapper, Storage};
 /// A robot that repeats the same round all day: many scans of a small map, with background flushes.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Day {
-    /// The scans.
     pub case: Case,
     /// Memory limit in bytes, for all that grows.
     pub memory_bytes: usize,
@@ -50,7 +49,6 @@ pub struct Part {
     pub tiles: u64,
 }
 
-/// Result of the day.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct DayFound {
     pub parts: Vec<Part>,
@@ -83,7 +81,7 @@ impl Day {
         let mut since_last = Stopwatch::start()?;
         for scan in self.case.scans()? {
             let scan = scan?;
-            // Excludes the generation of the scan, but not what other threads did meanwhile.
+            // Excludes the generation of the scan, but includes work that other threads did meanwhile.
             open_part.cpu_s += since_last.stop()?.others_s;
             let stopwatch = Stopwatch::start()?;
             mapper.insert_scan(&scan)?;
@@ -127,7 +125,7 @@ impl OpenPart {
         self.part.map_bytes = self.part.map_bytes.max(bytes);
         let log = folder.join("commits.log");
         let log_bytes =
-            fs::metadata(&log).with_context(|| format!("{}: cannot look at", log.display()))?.len();
+            fs::metadata(&log).with_context(|| format!("{}: cannot read the size", log.display()))?.len();
         self.part.log_bytes = self.part.log_bytes.max(log_bytes);
         Ok(())
     }

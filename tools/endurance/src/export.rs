@@ -14,9 +14,7 @@ use voxtile_formats::write::{OutputFormats, VoxelRow, VoxelsHead, WriteOptions};
 /// An export of a map in little memory.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Export {
-    /// Folder of the map.
     pub map: PathBuf,
-    /// Format of the file.
     pub format: ExportFormat,
     /// Memory for the part of an octree that is assembled at a time, in bytes.
     pub memory_bytes: usize,
@@ -24,7 +22,6 @@ pub struct Export {
     pub folder: PathBuf,
 }
 
-/// Format of an export.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum ExportFormat {
     /// The centers of the occupied voxels.
@@ -35,14 +32,10 @@ pub enum ExportFormat {
     Ot,
 }
 
-/// Result of an export.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Exported {
-    /// Voxels in the file.
     pub voxels: u64,
-    /// Bytes of the file.
     pub file_bytes: u64,
-    /// Wall time, in seconds.
     pub wall_s: f64,
     /// Largest resident memory of the process, in bytes.
     pub peak_resident_bytes: u64,
@@ -51,7 +44,6 @@ pub struct Exported {
 }
 
 impl ExportFormat {
-    /// All formats.
     pub const ALL: [Self; 3] = [Self::Ply, Self::Bt, Self::Ot];
 
     /// Extension of the files.
@@ -73,7 +65,7 @@ impl Export {
     pub fn run(self) -> Result<Exported> {
         let start_resident_bytes = process_memory::resident_bytes()?;
         fs::create_dir_all(&self.folder)
-            .with_context(|| format!("{}: cannot make the folder", self.folder.display()))?;
+            .with_context(|| format!("{}: cannot create the folder", self.folder.display()))?;
         let path = self.folder.join("map").with_extension(self.format.name());
         let begin = Instant::now();
         let voxels = self.write(&path).with_context(|| format!("{}: cannot export", path.display()))?;
@@ -108,7 +100,7 @@ fn write_occupied(map: &MapReader, path: &Path) -> Result<u64> {
     let grid = map.config().grid;
     let (_, count) = map.voxel_counts().context("the map has no voxel counts")?;
     let formats = OutputFormats::default();
-    let format = formats.of_name("ply").context("without PLY")?;
+    let format = formats.of_name("ply").context("PLY is not supported")?;
     let head = VoxelsHead::of_stream(count, grid.resolution_m());
     let mut sink = format.open(&head, path, &WriteOptions::beside(path))?;
     let mut written = Ok(());

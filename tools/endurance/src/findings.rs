@@ -50,7 +50,7 @@ impl Findings {
     pub fn into_answer(mut self, file: &'static str, is_short: bool) -> (Answer, Vec<Promise>) {
         self.promises.retain(|promise| !(is_short && promise.is_about_time));
         if !self.promises.is_empty() {
-            self.answer.tables.insert(0, promise::table(file, "What was promised.", &self.promises));
+            self.answer.tables.insert(0, promise::table(file, "Promises.", &self.promises));
         }
         (self.answer, self.promises)
     }

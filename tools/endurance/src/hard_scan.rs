@@ -11,21 +11,17 @@ use workload::SurveyName;
 /// An input that needs much memory, and the settings of its map.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct HardScan {
-    /// Name in tables.
     pub name: String,
     /// The input.
     pub points: Points,
-    /// Edge of a voxel, in metres.
     pub resolution_m: f64,
-    /// Edge of a tile, in metres.
     pub tile_size_m: f64,
-    /// Memory limit, in MiB.
     pub limit_mib: usize,
     /// Whether each ray is inserted on its own (`--insert per-ray`).
     pub per_ray: bool,
     /// Whether a background flush begins after each scan instead of every minute.
     pub is_flushed: bool,
-    /// Whether the map has two files a tile instead of one compact file.
+    /// Whether the map has two files per tile instead of one compact file.
     pub is_octomap: bool,
     /// Other options of `voxtile build`.
     pub options: Vec<String>,
@@ -38,7 +34,6 @@ pub enum Points {
     Fan {
         /// Number of scans. The sensor advances by a fifth of `reach_m` between scans.
         scans: u32,
-        /// Number of rays.
         rays: u32,
         /// Length of the rays, in metres.
         reach_m: f64,
@@ -49,28 +44,21 @@ pub enum Points {
     },
     /// A PCD file of equal points, compressed to almost nothing.
     Packed {
-        /// Number of points.
         points: u32,
     },
-    /// A synthetic survey.
     Survey {
-        /// The survey.
         survey: SurveyName,
-        /// Number of scans.
         scans: usize,
     },
 }
 
 /// Cost of the command.
 #[derive(Clone, Debug, Serialize, Deserialize)]
-pub struct Taken {
+pub struct BuildCost {
     /// Peak of its resident memory, in bytes.
     pub peak_bytes: u64,
-    /// Its CPU time, in seconds.
     pub cpu_s: f64,
-    /// Tiles of the map.
     pub tiles: u64,
-    /// The map's digest.
     pub digest: String,
 }
 
@@ -80,7 +68,6 @@ const SURVEY_RAYS: u32 = 4_000;
 const UNLIMITED_MIB: usize = 1 << 24;
 
 impl HardScan {
-    /// Description of the input and the map.
     pub fn description(&self) -> String {
         let points = match &self.points {
             Points::Fan { scans, rays, reach_m, is_sky, .. } => {
@@ -142,7 +129,7 @@ impl HardScan {
     /// # Errors
     ///
     /// Fails if the command is missing or fails.
-    pub fn build(&self, input: &Path, map: &Path, is_limited: bool) -> Result<Taken> {
+    pub fn build(&self, input: &Path, map: &Path, is_limited: bool) -> Result<BuildCost> {
         let reach_m = match self.points {
             Points::Fan { reach_m, .. } => reach_m,
             _ => 60.0,
@@ -170,7 +157,7 @@ impl HardScan {
         ensure!(digest.status.success(), "{}: no digest: {}", self.name, digest.status);
         let digest = String::from_utf8(digest.stdout)?;
         fs::remove_dir_all(map).with_context(|| format!("{}: cannot remove", map.display()))?;
-        Ok(Taken {
+        Ok(BuildCost {
             peak_bytes: number("peak_rss_bytes")?,
             cpu_s,
             tiles: number("tiles")?,
@@ -181,7 +168,7 @@ impl HardScan {
 
 fn command() -> Result<Command> {
     let program = std::env::current_exe()?.with_file_name("voxtile");
-    ensure!(program.is_file(), "{}: build the command first", program.display());
+    ensure!(program.is_file(), "{}: missing; build the command `voxtile` first", program.display());
     Ok(Command::new(program))
 }
 

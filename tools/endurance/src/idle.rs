@@ -11,7 +11,6 @@ use voxtile::{MapView, Mapper, OutOfCoreTileMapper};
 /// A mapper that is idle after some scans, without a flush.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Idle {
-    /// The scans.
     pub case: Case,
     /// Memory limit in bytes, for all that grows.
     pub memory_bytes: usize,
@@ -24,19 +23,18 @@ pub struct Idle {
 /// Cost of the idle time.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Idled {
-    /// Wall time, in seconds.
     pub wall_s: f64,
     /// CPU time of all threads, in seconds.
     pub cpu_s: f64,
-    /// Tiles written before.
+    /// Number of tiles written before the idle time.
     pub saves: u64,
 }
 
-/// Time for threads to finish the work of the last scan.
+/// Waiting time in which threads finish the work of the last scan.
 const SETTLING_TIME: Duration = Duration::from_secs(2);
 
 impl Idle {
-    /// Runs it in this process.
+    /// Measures it in this process.
     ///
     /// # Errors
     ///

@@ -45,7 +45,7 @@ fn main() -> ExitCode {
     report::exit_code("endurance", outcome)
 }
 
-/// Returns whether all promises hold that do not depend on time.
+/// Returns whether all promises that do not depend on time hold.
 fn run(Arguments { options, json }: &Arguments) -> Result<bool> {
     let wanted = options.wanted(&QUESTIONS, |question| question.name.to_owned())?;
     let bench = Bench::open("endurance", options)?;

@@ -6,7 +6,6 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use voxtile::store::{Disk, DiskLock, DiskRead, DiskWrite, EntryKind, FsDisk, ReaderWatch, Scratch};
 
-/// Speed of a disk.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub enum DiskSpeed {
     /// The real speed.
@@ -18,14 +17,14 @@ pub enum DiskSpeed {
     Unsynced,
 }
 
-/// The file system at some speed, with counters of the bytes read and written.
+/// The file system, with a simulated speed and counters of the bytes read and written.
 #[derive(Debug)]
 pub struct MeteredDisk {
     meter: Arc<Meter>,
     is_synced: bool,
 }
 
-/// Counters of bytes.
+/// Counts bytes read and written.
 #[derive(Debug, Default)]
 pub struct Meter {
     bytes_read: AtomicU64,
@@ -40,7 +39,7 @@ struct Metered<T> {
 }
 
 impl MeteredDisk {
-    /// Creates the file system with a speed.
+    /// Wraps the file system, at this speed.
     pub fn new(speed: DiskSpeed) -> Self {
         let bucket = match speed {
             DiskSpeed::BytesPerSecond(bytes_per_s) => Some(Bucket::new(bytes_per_s)),
@@ -50,7 +49,6 @@ impl MeteredDisk {
         Self { meter, is_synced: speed != DiskSpeed::Unsynced }
     }
 
-    /// The counters.
     pub fn meter(&self) -> Arc<Meter> {
         self.meter.clone()
     }
@@ -66,12 +64,10 @@ impl MeteredDisk {
 }
 
 impl Meter {
-    /// Bytes read so far.
     pub fn bytes_read(&self) -> u64 {
         self.bytes_read.load(Ordering::Relaxed)
     }
 
-    /// Bytes written so far.
     pub fn bytes_written(&self) -> u64 {
         self.bytes_written.load(Ordering::Relaxed)
     }

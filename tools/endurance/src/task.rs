@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 use std::io::{self, Write};
 use std::process::{Command, Stdio};
 
-/// A task for a process of its own, so that its peak of memory includes nothing else.
+/// A task that runs in its own process, so that the peak of memory includes nothing else.
 #[derive(Debug, Serialize, Deserialize)]
 pub enum Task {
     /// Build a map.
@@ -32,7 +32,7 @@ pub trait ChildTask: Sized {
     /// Result of the task.
     type Found: DeserializeOwned;
 
-    /// Converts it into the task of the process.
+    /// Converts it into a [`Task`].
     fn into_task(self) -> Task;
 
     /// Runs the task in a new process and waits for it.
@@ -85,11 +85,11 @@ impl ChildTask for Day {
     }
 }
 
-/// Does the task on standard input and writes its result to standard output.
+/// Reads a task from standard input, runs it and writes its result to standard output.
 ///
 /// # Errors
 ///
-/// Fails if the input is not a task, or with the error of the task.
+/// Fails if the input is not a task or the task fails.
 pub fn do_task() -> Result<()> {
     let task = serde_json::from_reader(io::stdin().lock()).context("standard input has no valid task")?;
     let outcome = match task {

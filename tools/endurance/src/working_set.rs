@@ -10,7 +10,6 @@ use voxtile::{InMemoryMapper, MapQueries, MapView, Mapper};
 /// The tiles that the last [`WorkingSet::SCANS`] scans touched.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct WorkingSet {
-    /// The scans.
     pub case: Case,
 }
 
@@ -23,11 +22,10 @@ pub struct WorkingSetFound {
     pub tiles: u64,
     /// Bytes of all tiles at the end.
     pub map_bytes: u64,
-    /// The digest of the map, in hexadecimal digits.
     pub digest: String,
 }
 
-/// Tiles, with the number of the last scans that touched them.
+/// Tiles that the last scans touched, with the number of those scans.
 #[derive(Default)]
 struct Window {
     scans: VecDeque<Vec<TileIndex>>,
@@ -35,7 +33,7 @@ struct Window {
 }
 
 impl WorkingSet {
-    /// Number of last scans.
+    /// Number of scans in the window.
     pub const SCANS: usize = 50;
     /// The percentile that is reported.
     const SHARE: f64 = 0.95;

@@ -190,9 +190,9 @@ mod mapper {
             source!("write_buffer.rs");
         }
         #[cfg(test)]
-        mod lives;
-        #[cfg(test)]
         mod memory_disk;
+        #[cfg(test)]
+        mod scenarios;
     }
 }
 
@@ -201,18 +201,18 @@ use shuttle::scheduler::{PctScheduler, RandomScheduler};
 
 /// Runs a test in many schedules.
 #[cfg(test)]
-fn in_many_orders(life: impl Fn() + Send + Sync + Copy + 'static) {
+fn in_many_orders(test: impl Fn() + Send + Sync + Copy + 'static) {
     let orders = std::env::var("INTERLEAVINGS").ok().and_then(|text| text.parse().ok()).unwrap_or(800);
     let mut config = shuttle::Config::new();
     // Writing a file needs a deeper stack than taking a lock.
     config.stack_size = 1 << 20;
-    let life = move || {
+    let test = move || {
         // The scheduler refuses a first run without two concurrent threads, and a random run may be one.
         let other = shuttle::thread::spawn(shuttle::thread::yield_now);
-        life();
+        test();
         other.join().expect("it does nothing");
     };
     let (random, few_changes) = (RandomScheduler::new(orders / 2), PctScheduler::new(3, orders / 2));
-    shuttle::Runner::new(random, config.clone()).run(life);
-    shuttle::Runner::new(few_changes, config).run(life);
+    shuttle::Runner::new(random, config.clone()).run(test);
+    shuttle::Runner::new(few_changes, config).run(test);
 }

@@ -18,11 +18,10 @@ pub enum Contender {
     Bricks,
 }
 
-/// Result of a build.
 pub struct Build {
-    /// Times of inserting the scans.
+    /// Time to insert the scans.
     pub inserting: Elapsed,
-    /// Times of updating the trees after the last scan.
+    /// Time to update the trees after the last scan.
     pub draining: Elapsed,
     /// Statistics after the last scan was inserted.
     pub inserted: MapStatistics,
@@ -31,7 +30,7 @@ pub struct Build {
 }
 
 impl Build {
-    /// Times from the first scan until all updates are in the trees.
+    /// Time from the first scan until all updates are in the trees.
     pub fn elapsed(&self) -> Elapsed {
         self.inserting + self.draining
     }

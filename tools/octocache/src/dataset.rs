@@ -24,7 +24,6 @@ enum Source {
 
 /// Maximum range, in metres.
 pub const MAX_RANGE_M: f64 = 60.0;
-/// Seed of the synthetic surveys.
 const SEED: u64 = 1;
 /// Approximate edge of a tile, in metres.
 const TILE_SIZE_M: f64 = 10.0;

@@ -2,7 +2,6 @@ use crate::dataset::Dataset;
 
 /// Inputs of the questions, and how much to measure.
 pub struct Setting {
-    /// The scans.
     pub datasets: Vec<Dataset>,
     /// Whether to check only that everything works.
     pub is_short: bool,

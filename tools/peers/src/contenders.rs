@@ -23,7 +23,7 @@ pub struct Contenders {
 pub enum Counting {
     /// Once per voxel and scan, cut at the max range.
     PerScan,
-    /// Each ray, without cut: OctoMap's `insertPointCloudRays` ignores the max range.
+    /// Each ray at full length: OctoMap's `insertPointCloudRays` ignores the max range.
     PerRay,
     /// Once per voxel and scan, weighted by intensity; voxtile only.
     Iwlo,

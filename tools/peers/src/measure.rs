@@ -6,7 +6,6 @@ use anyhow::{Context, Result};
 /// Maximum share of voxels and of answers that may differ between the contenders: rays may graze the edge of a voxel.
 const MAX_DIFFERENT: f64 = 1e-3;
 
-/// The samples of a workload.
 #[derive(Default)]
 struct Samples {
     one_thread: Pairs,
@@ -163,7 +162,7 @@ fn row(
     }
 }
 
-/// Text for seconds per scan, in milliseconds.
+/// Formats seconds per scan as milliseconds.
 fn milliseconds(seconds: f64) -> String {
     format!("{:.1} ms a scan", 1e3 * seconds)
 }

@@ -20,11 +20,11 @@ pub struct MemoryOutcome {
     pub voxels: u64,
     /// Bytes that the map reports after the last scan.
     pub bytes: u64,
-    /// Growth of the process from the first scan to the last, in bytes.
+    /// Growth of the process while the scans are inserted, in bytes.
     pub resident_bytes: u64,
     /// Bytes that the map reports with all octrees up to date.
     pub synced_bytes: u64,
-    /// Growth of the process from the first scan, with all octrees up to date, in bytes.
+    /// The same, after all octrees are up to date, in bytes.
     pub synced_resident_bytes: u64,
 }
 

@@ -1,14 +1,11 @@
 use Target::{AtLeast, AtMost};
 
-/// A row of the table.
 pub struct Row {
     /// Name of the measurement.
     pub what: String,
     /// Name of the workload.
     pub workload: String,
-    /// OctoMap's figure.
     pub octomap: String,
-    /// voxtile's figure.
     pub voxtile: String,
     /// OctoMap's figure divided by voxtile's: above 1, voxtile is better.
     pub ratio: Option<Ratio>,
@@ -38,7 +35,6 @@ pub enum Target {
 pub struct Pairs(Vec<[f64; 2]>);
 
 impl Pairs {
-    /// Adds a run.
     pub fn push(&mut self, octomap: f64, voxtile: f64) {
         self.0.push([octomap, voxtile]);
     }

@@ -13,13 +13,11 @@ pub struct Workload {
     source: Source,
     /// Number of scans in the stream.
     pub scans: usize,
-    /// Number of scans if every ray counts.
+    /// Number of scans in measurements where every ray counts.
     pub ray_scans: usize,
     /// Number of scans for the naive map.
     pub exact_scans: usize,
-    /// Edge of a voxel in metres.
     pub resolution_m: f64,
-    /// Targets of the workload.
     pub targets: Targets,
 }
 
@@ -48,11 +46,9 @@ pub struct Targets {
     pub per_ray: Option<Target>,
 }
 
-/// The files of a workload.
 pub struct Files {
-    /// Their folder, with space for other files.
+    /// Folder of the files, which may hold others.
     pub folder: PathBuf,
-    /// The scans.
     pub stream: PathBuf,
     /// Their intensities, if any.
     pub intensities: Option<PathBuf>,
@@ -60,7 +56,6 @@ pub struct Files {
 
 /// Maximum range in all workloads, in metres.
 pub const MAX_RANGE_M: f64 = 60.0;
-/// Seed of the synthetic surveys.
 const SEED: u64 = 1;
 
 /// The four workloads with targets.
@@ -129,7 +124,7 @@ pub fn real(data: &Path) -> Vec<Workload> {
 }
 
 impl Workload {
-    /// Value of `--only` for the workload: `street-0.2`.
+    /// Name for `--only`, such as `street-0.2`.
     pub fn part(&self) -> String {
         self.name.trim_end_matches(" m").replace('`', "").replace(' ', "-")
     }

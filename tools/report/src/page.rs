@@ -21,7 +21,7 @@ impl Page {
         let path = output.unwrap_or(source).to_owned();
         let folder = path.with_extension("");
         fs::create_dir_all(&folder)
-            .with_context(|| format!("{}: cannot make the folder", folder.display()))?;
+            .with_context(|| format!("{}: cannot create the folder", folder.display()))?;
         let page = Self { path, folder };
         if page.path != source {
             page.write(&read(source)?)?;
@@ -66,11 +66,11 @@ fn with_section(page: &str, section: &str, text: &str) -> Result<String> {
     let (begin, end) = (format!("<!-- {section}: measured -->\n"), format!("<!-- {section}: end -->\n"));
     for mark in [&begin, &end] {
         let count = page.matches(mark.as_str()).count();
-        ensure!(count == 1, "the page has the line {} {count} times; it needs it once", mark.trim_end());
+        ensure!(count == 1, "{} occurs {count} times in the page; it must occur once", mark.trim_end());
     }
     let (before, rest) = page.split_once(&begin).unwrap_or_default();
     let Some((_, after)) = rest.split_once(&end) else {
-        anyhow::bail!("the page has the line {} before {}", end.trim_end(), begin.trim_end());
+        anyhow::bail!("{} occurs before {} in the page", end.trim_end(), begin.trim_end());
     };
     Ok([before, &begin, text, &end, after].concat())
 }

@@ -18,7 +18,7 @@ impl WorkFolder {
     pub fn create(path: PathBuf) -> Result<Self> {
         ensure!(
             !path.exists() || path.join(MARKER).exists(),
-            "{}: exists and is not of a benchmark; remove it or choose another target folder",
+            "{}: already exists and is not a benchmark folder; remove it or choose another target folder",
             path.display()
         );
         let folder = Self(path);

@@ -1,9 +1,7 @@
 /// Medians of one measurement for both versions.
 #[derive(Clone, Copy)]
 pub struct Pair {
-    /// The earlier version.
     pub before: f64,
-    /// The current version.
     pub now: f64,
 }
 

@@ -9,13 +9,10 @@ use workload::{ScanWriter, SurveyName};
 
 /// A set of scans and the resolution of its map.
 pub struct ScanSet {
-    /// Name in tables.
     pub name: &'static str,
-    /// Edge of a voxel in metres.
     pub resolution_m: f64,
-    /// Number of scans.
     pub scans: usize,
-    /// Number of scans for per-ray updates.
+    /// Number of scans in measurements with per-ray updates.
     pub ray_scans: usize,
     /// The survey of a synthetic set.
     survey: Option<SurveyName>,
@@ -25,7 +22,6 @@ pub struct ScanSet {
 pub const MAX_RANGE_M: f64 = 60.0;
 const SEED: u64 = 1;
 
-/// The recorded sets.
 pub const RECORDED: [&str; 3] = ["balm_os0_hall", "fastlio_hku_1", "mulran_riverside02_a"];
 
 /// The eight sets; fewer sets with fewer scans if `is_short`.
@@ -104,11 +100,8 @@ impl ScanSet {
 
 /// A stream of scans for the contender.
 pub struct Stream {
-    /// Path of the file.
     pub path: PathBuf,
-    /// Number of scans.
     pub scans: usize,
-    /// Number of rays.
     pub rays: usize,
     /// Number of rays of the first scans, which are used for per-ray updates.
     pub first_rays: usize,

@@ -3,7 +3,6 @@ use std::path::PathBuf;
 
 /// Inputs of all questions.
 pub struct Setting {
-    /// Both versions.
     pub versions: Versions,
     /// The folder of recorded data sets.
     pub data: PathBuf,

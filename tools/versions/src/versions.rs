@@ -5,9 +5,7 @@ use report::Samples;
 
 /// The versions to compare.
 pub struct Versions {
-    /// The earlier version.
     pub before: Programs,
-    /// The current version.
     pub now: Programs,
     /// Number of runs of each measurement, alternating between the versions.
     pub runs: usize,

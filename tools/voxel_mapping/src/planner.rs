@@ -42,7 +42,7 @@ pub fn plan(view: &LocalView, from: Point, to: Point) -> Option<Vec<Point>> {
             }
             let length = f64::from(step.iter().map(|k| k * k).sum::<i32>()).sqrt();
             let cost = cost + (length * 100.0) as u32;
-            // The start may be in an inflated voxel; other steps must be free.
+            // The start may be in an inflated voxel. Later steps must not cross one.
             let is_known = best.get(&next).is_some_and(|(known, _)| *known <= cost);
             if !is_known && (node == [0; 3] || is_free(view, point(node), at)) {
                 best.insert(next, (cost, node));

@@ -8,7 +8,6 @@ use voxtile::space::{Grid, Point};
 use voxtile_formats::{ReadOptions, ScanSource, open_scans};
 use voxtile_local::{LocalMap, LocalParameters, LocalReader, LocalState};
 
-/// Edge of a voxel.
 const RESOLUTION_M: f64 = 0.1;
 /// Interval of memory counts, in scans: a count visits the whole map.
 const COUNT_EVERY: usize = 16;

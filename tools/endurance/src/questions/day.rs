@@ -91,7 +91,7 @@ fn promises(
 
 fn table(day: &Day, found: &DayFound) -> Table {
     let caption = format!(
-        "A day by parts: {}; limit {} MiB, storage `{}`, a flush beside the mapper every {} scans. Memory, files and \
+        "A day by parts: {}; limit {} MiB, storage `{}`, a background flush every {} scans. Memory, files and \
          bytes are the most of each part.",
         day.case.description(),
         day.memory_bytes >> 20,

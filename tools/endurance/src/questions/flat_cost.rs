@@ -17,7 +17,6 @@ const SCANS_AT_A_TIME: usize = 50;
 const MAX_GROWTH: f64 = 1.15;
 /// Maximum ratio of the 99th percentile to the median.
 const MAX_SLOW: f64 = 3.0;
-/// Number of windows of a plot.
 const WINDOWS: usize = 40;
 
 /// Name of a clock, and the time that it measured for a scan.
@@ -74,7 +73,7 @@ fn promises(case: &str, built: &Built, stretch_m: f64) -> Vec<Promise> {
     });
     let wall_ms = samples(evicting(built), |scan| scan.wall_ms);
     let slow = wall_ms.quantile(0.99) / wall_ms.median();
-    let what = format!("{case}: wall of the 99th percentile by the median, while tiles are pushed out");
+    let what = format!("{case}: wall of the 99th percentile by the median, while tiles are evicted");
     growth.into_iter().chain([Promise::about_time(what, slow, Wanted::AtMost(MAX_SLOW), "")]).collect()
 }
 
@@ -123,11 +122,11 @@ fn stretches(file: &'static str, built: &Built, stretch_m: f64, what: &str) -> T
 
 fn latencies(file: &'static str, built: &Built, what: &str) -> Table {
     let caption = format!(
-        "Wall milliseconds of `insert_scan`: of all scans, and of those while tiles are pushed out; {what}."
+        "Wall milliseconds of `insert_scan`: of all scans, and of those while tiles are evicted; {what}."
     );
     let columns = ["scans", "how many", "median", "p90", "p99", "worst", "p99 by median"];
     let mut table = Table::new(file, caption, columns);
-    for (name, scans) in [("all", &built.scans[..]), ("while tiles are pushed out", evicting(built))] {
+    for (name, scans) in [("all", &built.scans[..]), ("while tiles are evicted", evicting(built))] {
         let wall_ms = samples(scans, |scan| scan.wall_ms);
         let of = |share| Cell::Number(wall_ms.quantile(share), 2);
         table.push([

@@ -64,10 +64,10 @@ pub fn answer(setting: &Setting) -> Result<Findings> {
         findings.promises.extend([
             promise("p99.9 of a scan by the median", by_median, MAX_BY_MEDIAN, ""),
             promise("longest call", background.insert_ms(1.0).max(background.flush_ms()), MAX_MS, "ms"),
-            promise("CPU time by that of flushes that stop", cpu, MAX_CPU, ""),
+            promise("CPU time, background flushes by blocking ones", cpu, MAX_CPU, ""),
         ]);
         let differ = f64::from(u8::from(blocking.built.digest != background.built.digest));
-        let what = format!("{disk}: digests that differ from that of flushes that stop");
+        let what = format!("{disk}: digests that differ from that with blocking flushes");
         findings.promises.push(Promise::new(what, differ, Wanted::AtMost(0.0), ""));
     }
     findings.answer.tables = vec![table(&case.description(), &runs)];
@@ -91,7 +91,7 @@ impl Run {
 
 fn table(case: &str, runs: &[Run]) -> Table {
     let caption = format!(
-        "Wall time of calls at ten scans a second with a flush every ten seconds, limit 512 MiB, storage `octomap` where nothing else is said; {case}. \
+        "Wall time of calls at ten scans a second with a flush every ten seconds, limit 512 MiB, storage `octomap` unless noted; {case}. \
          A background flush returns once it has begun."
     );
     let columns = [
@@ -110,7 +110,7 @@ fn table(case: &str, runs: &[Run]) -> Table {
     for of in runs {
         table.push([
             of.disk.into(),
-            if of.is_background { "background" } else { "stops" }.into(),
+            if of.is_background { "background" } else { "blocking" }.into(),
             Cell::Number(of.insert_ms(0.5), 1),
             Cell::Number(of.insert_ms(0.99), 1),
             Cell::Number(of.insert_ms(0.999), 1),

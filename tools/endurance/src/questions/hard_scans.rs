@@ -2,7 +2,7 @@
 
 use super::memory::OVERHEAD_MIB;
 use crate::findings::Findings;
-use crate::hard_scan::{HardScan, Points, Taken};
+use crate::hard_scan::{BuildCost, HardScan, Points};
 use crate::promise::{Promise, Wanted};
 use crate::setting::{Setting, mib};
 use anyhow::{Context, Result};
@@ -26,8 +26,7 @@ pub fn answer(setting: &Setting) -> Result<Findings> {
         "without a limit",
         "digest",
     ];
-    let caption =
-        "The command `voxtile build`, one process a map; CPU without a limit beside that within it.";
+    let caption = "The command `voxtile build`, one process a map; CPU time with the limit and without one.";
     let mut table = Table::new("hard_scans", caption, columns);
     for hard in cases(setting) {
         let [limited, unlimited] = measured(setting, &hard).with_context(|| hard.description())?;
@@ -70,7 +69,7 @@ pub fn answer(setting: &Setting) -> Result<Findings> {
 }
 
 /// Cost with the limit and without one.
-fn measured(setting: &Setting, hard: &HardScan) -> Result<[Taken; 2]> {
+fn measured(setting: &Setting, hard: &HardScan) -> Result<[BuildCost; 2]> {
     let input = hard.write(&setting.work)?;
     let map = setting.work.join("hard");
     let taken = [hard.build(&input, &map, true)?, hard.build(&input, &map, false)?];

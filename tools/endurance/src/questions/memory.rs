@@ -115,19 +115,19 @@ impl Measured {
     }
 
     fn panel(&self) -> Panel {
-        let is_way = self.case.is_way();
+        let follows_trajectory = self.case.follows_trajectory();
         let limited = self.limited.iter().map(|limited| (limited.name(), &limited.built));
         let lines = limited.chain([("in memory".to_owned(), &self.in_memory)]).map(|(name, built)| {
             let every = built.scans.len().div_ceil(400).max(1);
             let points = built.scans.iter().enumerate().step_by(every).map(|(number, scan)| {
-                let x = if is_way { scan.distance_m / 1e3 } else { (number + 1) as f64 };
+                let x = if follows_trajectory { scan.distance_m / 1e3 } else { (number + 1) as f64 };
                 [x, mib(scan.resident_bytes as f64)]
             });
             Line { name, points: points.collect() }
         });
         Panel {
             title: self.case.name.clone(),
-            x_label: if is_way { "distance, km" } else { "scans" }.to_owned(),
+            x_label: if follows_trajectory { "distance, km" } else { "scans" }.to_owned(),
             y_label: "resident memory, MiB".to_owned(),
             content: Content::Lines { x_scale: Scale::Linear, y_scale: Scale::Log, lines: lines.collect() },
         }
@@ -146,8 +146,7 @@ impl Limited {
 }
 
 fn table(measured: &[Measured]) -> Table {
-    let caption = "Peaks of the resident memory of processes that do nothing but build the map, and how many tiles go to the \
-                   disk. *beyond*: peak less limit.";
+    let caption = "Peaks of the resident memory of processes that only build the map, and numbers of tiles written and read. *beyond*: peak less limit.";
     let columns = [
         "map",
         "what",

@@ -15,13 +15,12 @@ use crate::findings::Findings;
 use crate::setting::Setting;
 use anyhow::Result;
 
-/// A question about the mapper.
 pub struct Question {
-    /// Section of the page, and value of `--only`.
+    /// Name of the section in the page and for `--only`.
     pub name: &'static str,
     /// File of the promises, without extension.
     pub promises: &'static str,
-    /// Measures the answer.
+    /// Runs the measurements.
     pub answer: fn(&Setting) -> Result<Findings>,
 }
 

@@ -130,7 +130,7 @@ impl Measured {
 
 fn table(measured: &[Measured]) -> Table {
     let caption = "Maps built with either storage in turn: time from the first scan until the flush at the end is done, all scans \
-                   made beforehand; bytes of the map's files, and those that went either way.";
+                   made beforehand; bytes of the map's files, and bytes written and read.";
     let columns = [
         "map",
         "what",

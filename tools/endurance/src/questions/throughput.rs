@@ -32,7 +32,7 @@ struct Measured {
 /// The builds with one limit.
 struct OfLimit {
     limit: Limit,
-    /// Required share of the speed without a limit; 0 for no limit itself.
+    /// Required share of the speed without a limit; 0 for the build without a limit.
     wanted_share: f64,
     wall_s: Samples,
     /// Result of the last run; the others differ in time only.
@@ -95,7 +95,7 @@ fn limits(case: &Case, working_set: &WorkingSetFound) -> Result<Vec<OfLimit>> {
         built: Built::default(),
     };
     let mut limits = vec![of_limit(Limit::None, 0.0)];
-    let least = case.least_bytes()?;
+    let least = case.min_bytes()?;
     for (part, wanted_share) in PARTS {
         let bytes = ((working_set.bytes as f64 / part) as usize).max(least);
         let limit = Limit::Bytes(bytes);

@@ -14,9 +14,9 @@ use report::Answer;
 
 /// A question of the paper.
 pub struct Question {
-    /// Section of the page, and value of `--only`.
+    /// Name of the section in the page and for `--only`.
     pub name: &'static str,
-    /// Measures the answer.
+    /// Runs the measurements.
     pub answer: fn(&Setting) -> Result<Answer>,
 }
 

@@ -73,8 +73,7 @@ pub fn answer(setting: &Setting) -> Result<Answer> {
         }
         tables.push(table);
         let caption = format!(
-            "Where the time of a scan goes, {what}: the thread that maps, and for the last contender the thread that \
-             writes trees beside it"
+            "Where the time of a scan goes, {what}: the mapping thread, and for the last contender the thread that writes trees"
         );
         plots.push(Plot { file, caption, panels });
     }

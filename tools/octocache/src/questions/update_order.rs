@@ -32,7 +32,7 @@ enum Order {
 }
 
 const ORDERS: [(Order, &str); 7] = [
-    (Order::Original, "as rays come"),
+    (Order::Original, "ray by ray"),
     (Order::Random, "random"),
     (Order::Xyz, "by x, y, z"),
     (Order::Yzx, "by y, z, x"),

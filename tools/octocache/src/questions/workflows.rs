@@ -13,9 +13,8 @@ use voxtile::{InsertMode, VoxelCacheConfig};
 /// One of the paper's two workflows.
 struct Workflow {
     insert_mode: InsertMode,
-    /// Factor of the number of scans, `some_scans`, of each data set.
+    /// Multiple of each data set's `some_scans`.
     scans: usize,
-    /// Names of the files.
     files: [&'static str; 4],
     caption: &'static str,
 }
@@ -65,8 +64,7 @@ fn answer(setting: &Setting, workflow: &Workflow) -> Result<Answer> {
     }
     let wall = "How many times as fast as *off*, by resolution in metres; wall time from the first scan until everything is \
                 in the trees, median of the runs.";
-    let cpu = "The same in CPU time of the thread that maps: what a second core spares it, and no matter what else the \
-               machine does.";
+    let cpu = "The same in CPU time of the mapping thread: a second core reduces it, and other load of the machine does not affect it.";
     let tables = vec![
         ratios(workflow.files[0], wall, &measured, &resolutions_m, |times| &times.wall_s),
         ratios(workflow.files[1], cpu, &measured, &resolutions_m, |times| &times.own_s),
@@ -129,7 +127,7 @@ fn seconds(workflow: &Workflow, measured: &[Measured]) -> Table {
         "contender",
         "wall s",
         "of that after the last scan s",
-        "CPU s of the thread that maps",
+        "CPU s of the mapping thread",
         "CPU s of the thread that writes trees",
         "spread of wall",
         "spread of CPU",

@@ -33,7 +33,7 @@ fn main() -> Result<()> {
     let (Some(work), Some(folder)) = (args.next(), args.next()) else {
         bail!("usage: rust_queries WORK FOLDER");
     };
-    let work = Work::read(&fs::read(&work).with_context(|| format!("{}", work.display()))?)?;
+    let work = Work::read(&fs::read(&work).with_context(|| format!("{}: cannot read", work.display()))?)?;
     let folder = Path::new(&folder);
     let config = MapConfig::new(RESOLUTION_M, 10.0)?.with_memory_bytes(MEMORY_BYTES);
     let mut mapper = OutOfCoreTileMapper::create(folder, config)?;

@@ -348,7 +348,7 @@ impl Stopwatch {
 
 fn process_cpu_time() -> Result<Duration> {
     Duration::try_from(clock_gettime(ClockId::ProcessCPUTime))
-        .context("the CPU clock is not a length of time")
+        .context("the CPU clock returned an invalid time")
 }
 
 /// Resident memory of the process in bytes, from Linux.

@@ -60,7 +60,7 @@ impl FaultyDisk {
         self.state().operations
     }
 
-    /// Number of operations so far that change the disk.
+    /// Number of operations so far that changed the disk.
     pub fn changes(&self) -> u64 {
         self.state().changes
     }

@@ -105,7 +105,7 @@ impl DiskLock for Locked {
     fn is_in_place(&self) -> io::Result<bool> {
         let mut state = self.disk.state();
         state.attempt(Kind::Reads, &self.path)?;
-        // The rename of an unfinished map to its name moves the file.
+        // The lock file moves when an unfinished map is renamed to its final name.
         Ok(state.names.get(&self.path) == Some(&Entry::File(self.inode)))
     }
 }

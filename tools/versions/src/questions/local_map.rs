@@ -4,7 +4,6 @@ use crate::setting::Setting;
 use anyhow::Result;
 use report::{Answer, Cell, Table};
 
-/// The presets of `voxtile local`.
 const PRESETS: [&str; 3] = ["local", "autonomous", "passive"];
 
 /// Measures updates of the local map.

@@ -12,9 +12,9 @@ use report::Answer;
 
 /// A section of the page.
 pub struct Question {
-    /// Value of `--only`.
+    /// Name for `--only`.
     pub name: &'static str,
-    /// Measures the answer.
+    /// Runs the measurements.
     pub answer: fn(&Setting) -> Result<Answer>,
 }
 

@@ -21,7 +21,6 @@ const SCAN_EVERY_S: f64 = 0.1;
 const STEP_S: f64 = 0.01;
 const MAX_TIME_S: f64 = 120.0;
 
-/// Result of a flight.
 pub struct Flight {
     pub path: Vec<Point>,
     pub length_m: f64,
@@ -136,7 +135,7 @@ fn nearest_leg(path: &[Point], at: Point) -> usize {
     (0..path.len().saturating_sub(1)).min_by(|&a, &b| to_leg_m(a).total_cmp(&to_leg_m(b))).unwrap_or(0)
 }
 
-/// Maximum speed that permits to brake for each corner.
+/// Maximum speed at which the drone can still slow down for each corner.
 fn speed_limit(path: &[Point], at: Point) -> f64 {
     let mut limit = MAX_SPEED_M_S;
     let mut left_m = path.get(1).map_or(0.0, |corner| distance_m(at, *corner));

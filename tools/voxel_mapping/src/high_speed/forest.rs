@@ -17,7 +17,7 @@ pub const GOAL: Point = [206.0, 0.0, 2.0];
 
 /// Trees per square metre.
 const DENSITY: f64 = 0.07;
-/// Share of thickets.
+/// Share of the trees that are thickets.
 const THICKETS: f64 = 0.15;
 /// Minimum distance between the centers of two trees.
 const MIN_DISTANCE_M: f64 = 2.4;

@@ -16,7 +16,6 @@ use voxtile::{Result, Scan};
 use voxtile_local::{LocalMap, LocalParameters, LocalView};
 use window::Window;
 
-/// Edge of a voxel.
 const RESOLUTION_M: f64 = 0.1;
 /// Inflation of obstacles: half of the drone's width, and a margin for deviations from the path.
 const INFLATION_M: f64 = 0.6;

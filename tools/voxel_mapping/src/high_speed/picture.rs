@@ -2,7 +2,6 @@ use super::flight::Flight;
 use super::forest::{Forest, WIDTH_M};
 use std::fmt::Write;
 
-/// Pixels per metre.
 const SCALE: f64 = 5.0;
 /// Distance between forests, in metres.
 const PITCH_M: f64 = WIDTH_M + 6.0;

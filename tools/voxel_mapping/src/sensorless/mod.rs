@@ -15,7 +15,6 @@ use std::fs;
 use std::path::Path;
 use std::time::Duration;
 
-/// Edge of a voxel.
 const RESOLUTION_M: f64 = 0.1;
 /// Interval of plans, and of the scans of a spotter (5 Hz).
 const STEP: Duration = Duration::from_millis(200);
@@ -24,7 +23,6 @@ const MAX_STEPS: u32 = 600;
 /// Number of steps of the spotters before the travellers start.
 const HEAD_START_STEPS: u32 = 25;
 
-/// Result of a forest.
 struct Outcome {
     travellers: Vec<Traveller>,
     /// Bytes per second between the robots, or from the sensors at 16 bytes per point.

@@ -3,7 +3,6 @@ use super::robots::{Sharing, Traveller};
 use std::collections::BTreeSet;
 use std::fmt::Write;
 
-/// Pixels per metre.
 const SCALE: f64 = 9.0;
 const MARGIN_M: f64 = 4.0;
 const COLORS: [&str; 4] = ["#b2182b", "#d6604d", "#2166ac", "#4393c3"];

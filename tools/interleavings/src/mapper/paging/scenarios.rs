@@ -19,7 +19,7 @@ const TILES: i32 = 8;
 const TILE_M: f64 = 4.0;
 
 /// The tiles of a map, and their expected contents.
-struct Life {
+struct Scenario {
     tiles: PagedTiles,
     disk: MemoryDisk,
     config: MapConfig,
@@ -46,7 +46,7 @@ fn voxels(tile: &Tile) -> Vec<Voxel> {
     tile.voxels().collect()
 }
 
-impl Life {
+impl Scenario {
     fn new(storage: Storage, in_background: bool) -> Self {
         let (disk, config, map_id) = (MemoryDisk::new(), config(storage), new_map_id());
         let metadata = new_metadata(&config, map_id, &[]);
@@ -210,44 +210,44 @@ impl Life {
     }
 }
 
-fn run_life(storage: Storage, in_background: bool) {
-    let mut life = Life::new(storage, in_background);
+fn run_scenario(storage: Storage, in_background: bool) {
+    let mut scenario = Scenario::new(storage, in_background);
     for _ in 0..2 {
-        life.run(24);
-        life.check_tiles();
-        if !life.in_background {
-            life.check_saves();
+        scenario.run(24);
+        scenario.check_tiles();
+        if !scenario.in_background {
+            scenario.check_saves();
         }
-        life = life.reopen();
-        life.check_tiles();
+        scenario = scenario.reopen();
+        scenario.check_tiles();
     }
-    life.disk.refuse(false);
-    life.insert();
-    life.flush(false);
-    life.reopen().check_tiles();
+    scenario.disk.refuse(false);
+    scenario.insert();
+    scenario.flush(false);
+    scenario.reopen().check_tiles();
 }
 
 /// Inserts, queries and flushes on a disk that sometimes refuses: no update is lost or counted twice, no older version
 /// of a tile replaces a newer one, and there is no deadlock.
 #[test]
 fn tiles_keep_their_contents_while_saved_and_loaded() {
-    in_many_orders(|| run_life(Storage::Compact, false));
+    in_many_orders(|| run_scenario(Storage::Compact, false));
 }
 
 /// The same if the saving thread unpacks tiles.
 #[test]
 fn tiles_unpacked_by_the_saving_thread_keep_their_contents() {
-    in_many_orders(|| run_life(Storage::OctoMap, false));
+    in_many_orders(|| run_scenario(Storage::OctoMap, false));
 }
 
 /// The same with background flushes during inserts, queries and the drop of the map: the map on disk is that of one of
 /// the flushes.
 #[test]
 fn a_background_flush_saves_the_map_as_of_one_scan() {
-    in_many_orders(|| run_life(Storage::Compact, true));
+    in_many_orders(|| run_scenario(Storage::Compact, true));
 }
 
 #[test]
 fn a_background_flush_that_unpacks_tiles_saves_the_map_as_of_one_scan() {
-    in_many_orders(|| run_life(Storage::OctoMap, true));
+    in_many_orders(|| run_scenario(Storage::OctoMap, true));
 }
