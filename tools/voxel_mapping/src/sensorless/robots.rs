@@ -209,10 +209,10 @@ impl Traveller {
         }
         self.steps += 1;
         let begin = Instant::now();
-        let plan_path = self.plan_path();
+        let path = self.plan_path();
         self.planning += begin.elapsed();
         let mut rest = SPEED_M_PER_S * STEP.as_secs_f64();
-        for &corner in plan_path.iter().skip(1) {
+        for &corner in path.iter().skip(1) {
             let length = distance_m(self.at, corner);
             let part = if length <= rest { 1.0 } else { rest / length };
             let from = self.at;
@@ -239,9 +239,9 @@ impl Traveller {
                     to[1] += aside;
                 }
                 if is_free(self.map.view(), to, to)
-                    && let Some(plan_path) = plan(self.map.view(), self.at, to)
+                    && let Some(path) = plan(self.map.view(), self.at, to)
                 {
-                    return plan_path;
+                    return path;
                 }
             }
         }
