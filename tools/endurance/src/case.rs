@@ -132,7 +132,7 @@ impl Case {
     }
 }
 
-/// Drops intensities: log-odds do not need them, and they would take most memory of a scan after its points.
+/// Drops intensities to save memory: log-odds do not use them.
 fn without_intensities(scan: Scan) -> Scan {
     Scan { intensities: None, ..scan }
 }

@@ -174,7 +174,7 @@ fn command() -> Result<Command> {
 
 /// CPU time of the processes that this one has waited for, in seconds.
 fn children_cpu_s() -> Result<f64> {
-    /// USER_HZ, which is 100 on all Linux platforms.
+    /// USER_HZ, which is 100 on x86-64 and AArch64 Linux.
     const TICKS_PER_SECOND: f64 = 100.0;
     let stat = fs::read_to_string("/proc/self/stat")?;
     // The 16th and 17th fields; the name before `)` may contain anything.
