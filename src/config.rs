@@ -1,9 +1,12 @@
+mod clearing;
 mod storage;
 
 use crate::error::{Error, Result};
 use crate::maths::logit;
 use crate::sensor::SensorModel;
 use crate::space::{Grid, TileBox};
+pub(crate) use clearing::GUARD_REACH;
+pub use clearing::{Clearing, Guard};
 use serde::{Deserialize, Serialize};
 use std::fmt;
 pub use storage::Storage;
@@ -98,6 +101,9 @@ pub struct RayConfig {
     pub region: Option<TileBox>,
     /// Number of updates of a voxel per scan. Default: one.
     pub insert_mode: InsertMode,
+    /// Rule for the voxels that rays pass. `None` is the rule of the map, and [`Clearing::Octomap`] for a new map.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub clearing: Option<Clearing>,
 }
 
 /// Number of updates of a voxel per scan.
@@ -178,7 +184,21 @@ impl Default for RayConfig {
             no_return_range_m: None,
             region: None,
             insert_mode: InsertMode::PerScan,
+            clearing: None,
         }
+    }
+}
+
+impl RayConfig {
+    /// Rule for the voxels that rays pass.
+    pub fn clearing(&self) -> Clearing {
+        self.clearing.unwrap_or_default()
+    }
+
+    /// Returns these settings with the stored form of the rule: absent for [`Clearing::Octomap`].
+    #[doc(hidden)]
+    pub fn stored(self) -> Self {
+        Self { clearing: self.clearing.filter(|clearing| *clearing != Clearing::Octomap), ..self }
     }
 }
 
@@ -229,6 +249,12 @@ impl MapConfig {
     /// Sets the insert mode.
     pub fn with_insert_mode(mut self, insert_mode: InsertMode) -> Self {
         self.rays.insert_mode = insert_mode;
+        self
+    }
+
+    /// Sets the rule for the voxels that rays pass.
+    pub fn with_clearing(mut self, clearing: impl Into<Option<Clearing>>) -> Self {
+        self.rays.clearing = clearing.into();
         self
     }
 
@@ -311,6 +337,13 @@ impl MapConfig {
         if max_range_m.is_some_and(|max| !(max > min_range_m && max.is_finite())) {
             let max = max_range_m.unwrap_or_default();
             return Err(wrong("max range", max, "a length above the min range, in metres"));
+        }
+        if let Some(guard) = self.rays.clearing().guard() {
+            guard.validated()?;
+            if self.rays.insert_mode == InsertMode::PerRay {
+                let reason = "guarded clearing needs the marks of a whole scan; use the insert mode per-scan";
+                return Err(Error::argument("clearing", reason));
+            }
         }
         if self.crs.as_ref().is_some_and(|crs| crs.len() > MAX_CRS_BYTES) {
             let reason = format!("the coordinate reference system exceeds {MAX_CRS_BYTES} bytes");

@@ -82,7 +82,8 @@ pub mod store;
 pub mod tile;
 
 pub use config::{
-    InsertMode, MapConfig, MemoryLimit, OctreeConfig, RayConfig, Storage, VoxelCacheConfig, VoxelCacheMode,
+    Clearing, Guard, InsertMode, MapConfig, MemoryLimit, OctreeConfig, RayConfig, Storage, VoxelCacheConfig,
+    VoxelCacheMode,
 };
 #[doc(hidden)]
 pub use error::beginning_or_difference;

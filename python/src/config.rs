@@ -1,10 +1,11 @@
 //! Configurations of maps from keyword arguments.
 
 use crate::errors::{exception, wrong};
+use crate::options::clearings;
 use bytesize::ByteSize;
 use pyo3::prelude::*;
 use voxtile::sensor::{Iwlo, LogOdds};
-use voxtile::{InsertMode, MapConfig, MemoryLimit, SensorModel, Storage};
+use voxtile::{Clearing, InsertMode, MapConfig, MemoryLimit, SensorModel, Storage};
 
 /// Arguments of [`config_of`].
 pub struct ConfigArguments<'a, 'py> {
@@ -13,6 +14,7 @@ pub struct ConfigArguments<'a, 'py> {
     pub min_range: f64,
     pub max_range: Option<f64>,
     pub insert_mode: &'a str,
+    pub clearing: &'a str,
     pub sensor_model: &'a str,
     pub probabilities: Option<[f64; 4]>,
     pub occupancy_threshold: f64,
@@ -31,6 +33,7 @@ pub fn config_of(py: Python<'_>, arguments: &ConfigArguments<'_, '_>) -> PyResul
             return Err(wrong(py, "insert_mode", format!("{other:?} is neither 'per-scan' nor 'per-ray'")));
         }
     };
+    let clearing = clearing_of(py, arguments.clearing)?;
     let sensor_model = match (arguments.sensor_model, arguments.probabilities) {
         ("log-odds", None) => SensorModel::default(),
         ("log-odds", Some([hit, miss, min, max])) => {
@@ -49,11 +52,20 @@ pub fn config_of(py: Python<'_>, arguments: &ConfigArguments<'_, '_>) -> PyResul
         .with_sensor_model(sensor_model)
         .with_range(arguments.min_range, arguments.max_range)
         .with_insert_mode(insert_mode)
+        .with_clearing(clearing)
         .with_storage(storage_of(py, arguments.storage)?)
         .with_kept_scans(arguments.keep_scans);
     config.occupancy_threshold = arguments.occupancy_threshold;
     config.memory = memory_of(arguments.memory.as_ref())?;
     config.validated().map_err(raised)
+}
+
+/// Returns the rule for the voxels that rays pass.
+pub fn clearing_of(py: Python<'_>, name: &str) -> PyResult<Clearing> {
+    let known = clearings().into_iter().find(|(known, _)| *known == name);
+    known
+        .map(|(_, clearing)| clearing)
+        .ok_or_else(|| wrong(py, "clearing", format!("{name:?} is neither 'octomap' nor 'guarded'")))
 }
 
 /// Returns the memory limit, or the default.

@@ -173,12 +173,12 @@ impl Map {
     /// Creates a map in a folder that is empty or does not exist.
     ///
     /// Lengths are in metres. `memory` bounds all memory that grows with the map: bytes, or a text such as "512MiB"
-    /// (the default). `insert_mode` is "per-scan" or "per-ray", `sensor_model` "log-odds" or "iwlo", `storage`
-    /// "octomap" or "compact". `probabilities` of the log-odds model are those of a hit and a miss, then the minimum
+    /// (the default). `insert_mode` is "per-scan" or "per-ray", `clearing` "octomap" or "guarded",
+    /// `sensor_model` "log-odds" or "iwlo", `storage` "octomap" or "compact". `probabilities` of the log-odds model are those of a hit and a miss, then the minimum
     /// and the maximum.
     #[staticmethod]
     #[pyo3(signature = (path, resolution=0.1, *, tile_size=10.0, min_range=0.0, max_range=None, insert_mode="per-scan",
-        sensor_model="log-odds", probabilities=None, occupancy_threshold=0.5, storage="octomap", memory=None, keep_scans=false))]
+        clearing="octomap", sensor_model="log-odds", probabilities=None, occupancy_threshold=0.5, storage="octomap", memory=None, keep_scans=false))]
     #[expect(clippy::too_many_arguments, reason = "keywords, in Python")]
     fn create(
         py: Python<'_>,
@@ -188,6 +188,7 @@ impl Map {
         min_range: f64,
         max_range: Option<f64>,
         insert_mode: &str,
+        clearing: &str,
         sensor_model: &str,
         probabilities: Option<[f64; 4]>,
         occupancy_threshold: f64,
@@ -203,6 +204,7 @@ impl Map {
                 min_range,
                 max_range,
                 insert_mode,
+                clearing,
                 sensor_model,
                 probabilities,
                 occupancy_threshold,

@@ -6,7 +6,7 @@ use crate::keywords::Keywords;
 use pyo3::prelude::*;
 use std::path::{Path, PathBuf};
 use voxtile::space::Aabb;
-use voxtile::{InsertMode, MemoryLimit, Storage};
+use voxtile::{Clearing, InsertMode, MemoryLimit, Storage};
 use voxtile_formats::ReadOptions;
 use voxtile_pipeline::numbers::{Mount, point_of, region_of, set_mount, tolerance_ns};
 use voxtile_pipeline::{BuildOptions, ExportOptions, SensorModelKind, WhenBehind, WhichVoxels};
@@ -14,6 +14,10 @@ use voxtile_pipeline::{BuildOptions, ExportOptions, SensorModelKind, WhenBehind,
 pub const STORAGES: [(&str, Storage); 2] = [("octomap", Storage::OctoMap), ("compact", Storage::Compact)];
 pub const INSERT_MODES: [(&str, InsertMode); 2] =
     [("per-scan", InsertMode::PerScan), ("per-ray", InsertMode::PerRay)];
+/// Rules for the voxels that rays pass, by keyword.
+pub fn clearings() -> [(&'static str, Clearing); 2] {
+    [("octomap", Clearing::Octomap), ("guarded", Clearing::guarded())]
+}
 const SENSOR_MODELS: [(&str, SensorModelKind); 2] =
     [("log-odds", SensorModelKind::LogOdds), ("iwlo", SensorModelKind::Iwlo)];
 const WHEN_BEHIND: [(&str, WhenBehind); 3] =
@@ -92,6 +96,7 @@ pub fn build_options(
     options.intensity_threshold = keywords.number("intensity_threshold")?;
     options.intensity_max = keywords.number("intensity_max")?;
     options.insert_mode = keywords.one_of("insert_mode", &INSERT_MODES)?;
+    options.clearing = keywords.one_of("clearing", &clearings())?;
     options.keep_scans = keywords.flag("keep_scans")?;
     options.region = region(py, &mut keywords, "region")?;
     options.clear_no_return_m = keywords.number("clear_no_return")?;

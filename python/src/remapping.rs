@@ -1,6 +1,6 @@
 //! Replays of the scans that a map keeps: new poses, other parameters, removals.
 
-use crate::config::{memory_of, storage_of};
+use crate::config::{clearing_of, memory_of, storage_of};
 use crate::errors::{exception_of_kind, wrong};
 use crate::map::region_of;
 use crate::operations::{Callback, MapOrSnapshot, folder_of, name_of, reported};
@@ -63,7 +63,7 @@ pub fn remap<'py>(
 /// the map.
 #[pyfunction]
 #[pyo3(signature = (map, output, *, resolution=None, tile_size=None, min_range=None, max_range=None, insert_mode=None,
-    storage=None, keep_scans=false, memory=None, progress=None))]
+    clearing=None, storage=None, keep_scans=false, memory=None, progress=None))]
 #[expect(clippy::too_many_arguments, reason = "keywords, in Python")]
 pub fn remap_as<'py>(
     py: Python<'py>,
@@ -74,6 +74,7 @@ pub fn remap_as<'py>(
     min_range: Option<f64>,
     max_range: Option<f64>,
     insert_mode: Option<&str>,
+    clearing: Option<&str>,
     storage: Option<&str>,
     keep_scans: bool,
     memory: Option<Bound<'py, PyAny>>,
@@ -87,6 +88,7 @@ pub fn remap_as<'py>(
             return Err(wrong(py, "insert_mode", format!("{other:?} is neither 'per-scan' nor 'per-ray'")));
         }
     };
+    let clearing = clearing.map(|clearing| clearing_of(py, clearing)).transpose()?;
     let storage = storage.map(|storage| storage_of(py, storage)).transpose()?;
     let memory = memory_of(memory.as_ref())?;
     reported(py, progress, |stop, progress| {
@@ -103,6 +105,7 @@ pub fn remap_as<'py>(
             rays.min_range_m = min_range.unwrap_or(rays.min_range_m);
             rays.max_range_m = max_range.or(rays.max_range_m);
             rays.insert_mode = insert_mode.unwrap_or(rays.insert_mode);
+            rays.clearing = clearing.or(rays.clearing);
             rays
         };
         operations::rebuild(&reader, &output, config, rays, stop, |done, all| progress.report(done, all))

@@ -1,6 +1,7 @@
 //! Rebuilds the index of a map from the readable remains of `metadata.json`, `commits.log` and tiles.
 
 use super::snapshots::last_known_flush;
+use crate::config::RayConfig;
 use crate::config::{MapConfig, Storage};
 use crate::error::{Error, FormatError, Result, is_of_medium};
 use crate::persistence::load::{ReadTable, read_stored_table};
@@ -403,7 +404,7 @@ fn identity(layout: &Layout, remains: &Salvage, trailers: &Trailers) -> Result<(
         scan_number: 0,
         sensor_model: parameters.sensor_model,
         occupancy_threshold: parameters.occupancy_threshold,
-        rays: crate::config::RayConfig::default(),
+        rays: RayConfig { clearing: parameters.clearing, ..RayConfig::default() },
         inputs: Vec::new(),
         decayed_scan: 0,
         storage: layout.storage(),

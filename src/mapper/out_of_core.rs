@@ -2,7 +2,7 @@ use super::kept_scan::pose_numbers;
 use super::paging::{MemoryPlan, PagedTiles, TilePager};
 use super::trace_rules::trace_rules;
 use super::{LiveReader, MapStatistics, MapView, Mapper, TileRef};
-use crate::config::{MapConfig, RayConfig};
+use crate::config::{Clearing, MapConfig, RayConfig};
 use crate::error::{Error, Result};
 use crate::persistence::{new_map_id, new_metadata};
 use crate::scan::{
@@ -68,13 +68,14 @@ impl OutOfCoreTileMapper {
     pub fn create_as(folder: impl Into<MapPath>, config: MapConfig, map_id: [u8; 16]) -> Result<Self> {
         let (disk, folder) = folder.into().into_parts();
         let folder = &*folder;
-        let config = config.validated_as_new()?;
+        let mut config = config.validated_as_new()?;
+        config.rays = config.rays.stored();
         let store = TileStore::create(disk, folder, new_metadata(&config, map_id, &[]), map_id)?;
         Ok(Self::new(config, store))
     }
 
-    /// Opens a map to continue it. Grid, sensor model and occupancy threshold of `config` must be those of the map;
-    /// [`MapReader::config_of`](super::MapReader::config_of) reads them.
+    /// Opens a map to continue it. Grid, sensor model, occupancy threshold and, if it is given, the rule of clearing of
+    /// `config` must be those of the map; [`MapReader::config_of`](super::MapReader::config_of) reads them.
     ///
     /// # Errors
     ///
@@ -85,7 +86,8 @@ impl OutOfCoreTileMapper {
         let config = config.validated()?;
         let store = TileStore::open(disk, folder)?;
         check_parameters(folder, store.metadata(), &config)?;
-        let config = config.with_storage(store.layout().storage());
+        let own = store.metadata().ext.as_ref().and_then(|ext| ext.rays.clearing);
+        let config = config.with_storage(store.layout().storage()).with_clearing(own).validated()?;
         Ok(Self::new(config, store))
     }
 
@@ -613,7 +615,7 @@ fn check_rays(folder: &Path, begun: &RayConfig, rays: &RayConfig) -> Result<()> 
     Ok(())
 }
 
-/// Checks that grid, sensor model and threshold are those of the map.
+/// Checks that grid, sensor model, threshold and rule of clearing are those of the map.
 fn check_parameters(folder: &Path, metadata: &Metadata, config: &MapConfig) -> Result<()> {
     let mismatch = |what, found: String, wanted: String| Error::Mismatch {
         path: folder.to_owned(),
@@ -629,6 +631,12 @@ fn check_parameters(folder: &Path, metadata: &Metadata, config: &MapConfig) -> R
     if metadata.tile_size_m != tile_size_m {
         let (found, wanted) = (format!("{} m", metadata.tile_size_m), format!("{tile_size_m} m"));
         return Err(mismatch("tile size", found, wanted));
+    }
+    let own = metadata.ext.as_ref().map_or(Clearing::Octomap, |ext| ext.rays.clearing());
+    if let Some(wanted) = config.rays.clearing
+        && wanted != own
+    {
+        return Err(mismatch("rule of clearing", own.to_string(), wanted.to_string()));
     }
     let Some(ext) = &metadata.ext else { return Ok(()) };
     if ext.sensor_model != config.sensor_model {

@@ -94,10 +94,13 @@ fn rule_for(maps: &[MapReader], first: &MapReader, prefer: Option<Prefer>) -> Re
     };
     let rule = checked.and_then(|()| {
         MergeRule::of(first.config(), prefer).ok_or_else(|| {
+            let cause = match first.config().rays.clearing().guard() {
+                Some(_) => "the maps have guarded clearing".to_owned(),
+                None => format!("the maps' sensor model is {}", model.name()),
+            };
             let reason = format!(
-                "the maps' sensor model is {}, whose evidence cannot be added: select the map of common voxels with \
-                 `prefer` first, last or more-observed",
-                model.name()
+                "{cause}, whose evidence cannot be added: select the map of common voxels with `prefer` first, last \
+                 or more-observed"
             );
             Error::argument("maps", reason)
         })
@@ -209,6 +212,9 @@ pub(super) fn check_model(map: &MapReader, first: &MapReader) -> Result<()> {
     } else if config.occupancy_threshold != wanted.occupancy_threshold {
         let (found, wanted) = (config.occupancy_threshold, wanted.occupancy_threshold);
         format!("its occupancy threshold is {found}, that of {first} is {wanted}")
+    } else if config.rays.clearing() != wanted.rays.clearing() {
+        let (found, wanted) = (config.rays.clearing(), wanted.rays.clearing());
+        format!("its rule of clearing is {found}, that of {first} is {wanted}")
     } else {
         return Ok(());
     };

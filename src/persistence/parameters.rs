@@ -14,7 +14,7 @@ pub(crate) fn new_metadata(config: &MapConfig, map_id: [u8; 16], inputs: &[Input
         scan_number: 0,
         sensor_model: config.sensor_model,
         occupancy_threshold: config.occupancy_threshold,
-        rays: config.rays,
+        rays: config.rays.stored(),
         inputs: inputs.to_vec(),
         decayed_scan: 0,
         storage: config.storage,
@@ -54,5 +54,6 @@ pub(crate) fn map_parameters(config: &MapConfig) -> MapParameters {
         tile_size: config.grid.tile_size_m(),
         sensor_model: config.sensor_model,
         occupancy_threshold: config.occupancy_threshold,
+        clearing: config.rays.stored().clearing,
     }
 }

@@ -5,9 +5,12 @@
 //!                  ray     pages, coherence            per_scan or per_ray, updates; spill if memory is short
 //! ```
 //!
+//! With guarded clearing, `clearing` finds the weak misses of a scan between marks and updates.
+//!
 //! `trace` coordinates all of it. Updates do not depend on the content of tiles, so they can be stored and applied
 //! later. `codec` compresses the points of kept scans.
 
+mod clearing;
 mod codec;
 mod coherence;
 mod coordinate;

@@ -73,7 +73,7 @@ pub(crate) fn updates_of_hits(
     };
     let Overflow { max_bytes, max_tiles, make_scratch, .. } = overflow;
     let mapped = MappedTiles { grid, selection: None };
-    let parts = ScanParts::new(mapped, stop, max_bytes / 4, max_tiles, make_scratch);
+    let parts = ScanParts::new(mapped, None, stop, max_bytes / 4, max_tiles, make_scratch);
     for_each_hit(scan, stop, |point, intensity| {
         collector.take_within(rays.region, point, intensity);
         if collector.updates.bytes() > max_bytes / 2 {

@@ -5,17 +5,21 @@ use super::{
     MappedTiles, Overflow, PackedUpdates, Scan, ScanPoints, ScanReport, ScanTracer, ScanUpdates, TileUpdates,
     TraceRules, UpdateOrder,
 };
-use crate::config::{InsertMode, RayConfig};
+use crate::config::{Clearing, Guard, InsertMode, RayConfig};
 use crate::error::Result;
 use crate::scratch::Scratch;
 use crate::sensor::{Iwlo, Observation, SensorModel};
 use crate::space::{
-    BRICK_EDGE, Grid, Point, TileBox, TileIndex, TileSelection, VoxelIndex, place_of_voxel, places,
+    BRICK_EDGE, Grid, Point, TileBox, TileIndex, TileSelection, VoxelIndex, is_in_mask, place_of_voxel,
+    places,
 };
 use proptest::prelude::*;
 use std::collections::BTreeMap;
 use std::io;
 use std::path::Path;
+
+/// Stands for a weak miss; no intensity has this value.
+const WEAK: f32 = -1.0;
 
 /// Updates of each voxel, in order: `None` for a miss, the bits of the intensity for a hit. The key is the tile, the
 /// brick code and the position in the brick.
@@ -30,7 +34,9 @@ fn add(by_voxel: &mut UpdatesByVoxel, grid: &Grid, tile: TileIndex, updates: &Ti
             for brick in bricks {
                 assert!(brick.hits.iter().zip(&brick.misses).all(|(hits, misses)| hits & misses == 0));
                 for (place, observation) in places(brick.touched()).zip(brick.observations()) {
-                    push(brick.brick.0, place, intensity(observation));
+                    let is_weak = is_in_mask(&brick.weak, place);
+                    assert!(!is_weak || observation == Observation::Miss);
+                    push(brick.brick.0, place, if is_weak { Some(WEAK) } else { intensity(observation) });
                 }
             }
         }
@@ -124,7 +130,11 @@ fn settings(tile_size_m: f64) -> Vec<Setting> {
         order,
         tiles: None,
     };
-    modes.map(setting).into()
+    let mut settings: Vec<Setting> = modes.map(setting).into();
+    let mut guarded = setting((InsertMode::PerScan, UpdateOrder::OfVoxels));
+    guarded.rays.clearing = Some(Clearing::Guarded(Guard::new(8).unwrap()));
+    settings.push(guarded);
+    settings
 }
 
 /// Rays in all directions, many of them similar.
@@ -226,8 +236,9 @@ fn restricted(whole: &(UpdatesByVoxel, ScanReport), tiles: &TileSelection) -> (U
     let by_voxel: UpdatesByVoxel =
         by_voxel.into_iter().filter(|((tile, ..), _)| tiles.contains(*tile)).collect();
     let updates = || by_voxel.values().flatten();
-    report.hits = updates().filter(|by_voxel| by_voxel.is_some()).count() as u64;
-    report.misses = updates().filter(|by_voxel| by_voxel.is_none()).count() as u64;
+    let is_hit = |update: &&Option<u32>| update.is_some_and(|intensity| intensity != WEAK.to_bits());
+    report.hits = updates().filter(is_hit).count() as u64;
+    report.misses = updates().count() as u64 - report.hits;
     let mut touched: Vec<TileIndex> = by_voxel.keys().map(|(tile, ..)| *tile).collect();
     touched.dedup();
     report.tiles_touched = touched.len() as u64;

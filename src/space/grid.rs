@@ -107,6 +107,11 @@ impl Grid {
         self.voxels_per_tile_edge
     }
 
+    /// Number of tiles along an axis that a distance in voxels can cross.
+    pub(crate) fn tiles_within(&self, voxels: i32) -> i32 {
+        (voxels + self.voxels_per_tile_edge - 1) / self.voxels_per_tile_edge
+    }
+
     /// Converts a point to units of voxels: its floor is the voxel index.
     #[inline]
     pub fn to_voxel_units(&self, point_m: Point) -> Point {

@@ -52,6 +52,15 @@ impl TileBox {
         tiles.map(|tile| Self::new(tile, tile)).reduce(Self::union)
     }
 
+    /// Returns the box enlarged by a number of tiles on all sides, within the range of indices.
+    #[must_use]
+    pub fn grown(self, tiles: i32) -> Self {
+        Self {
+            min: self.min.map(|k| k.saturating_sub(tiles)),
+            max: self.max.map(|k| k.saturating_add(tiles)),
+        }
+    }
+
     /// Lowest tile.
     pub fn min(self) -> TileIndex {
         self.min.into()

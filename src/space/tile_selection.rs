@@ -37,6 +37,17 @@ impl TileSelection {
             && self.tiles.as_ref().is_none_or(|tiles| tiles.contains(&tile))
     }
 
+    /// Returns the selected tiles and those that are at most `tiles` tiles away along each axis.
+    #[must_use]
+    pub fn grown(&self, tiles: i32) -> Self {
+        match &self.tiles {
+            Some(selected) => {
+                selected.iter().flat_map(|&tile| TileBox::new(tile, tile).grown(tiles).tiles()).collect()
+            }
+            None => Self { bounds: self.bounds.map(|bounds| bounds.grown(tiles)), tiles: None },
+        }
+    }
+
     /// Returns the selected tiles that are also in a box.
     #[must_use]
     pub fn within(&self, region: TileBox) -> Self {

@@ -6,7 +6,7 @@ use super::table::{Palette, Table};
 use crate::octree::{Octree, write_bt};
 use crate::scan::BrickUpdate;
 use crate::sensor::{Evidence, Iwlo, Observation, SensorModel};
-use crate::space::{BrickCode, BrickMask, MortonCode};
+use crate::space::{BrickCode, BrickMask, MortonCode, is_in_mask};
 use proptest::prelude::*;
 use std::collections::BTreeMap;
 
@@ -36,18 +36,23 @@ fn any_mask() -> impl Strategy<Value = BrickMask> {
 }
 
 fn any_update() -> impl Strategy<Value = BrickUpdate> {
-    let seed = (0..3_u64, any_mask(), any_mask(), 40.0..250.0_f32);
-    seed.prop_map(|(brick, hits, misses, first)| {
+    let seed = (0..3_u64, any_mask(), any_mask(), any_mask(), 40.0..250.0_f32);
+    seed.prop_map(|(brick, hits, misses, weak, first)| {
+        let weak = std::array::from_fn(|word| weak[word] & misses[word]);
         let count: u32 = hits.iter().map(|word| word.count_ones()).sum();
         let intensities = (0..count).map(|k| first + (k % 7) as f32).collect();
-        BrickUpdate { brick: BrickCode(0x0fff_ffff + brick), hits, misses, intensities }
+        BrickUpdate { brick: BrickCode(0x0fff_ffff + brick), hits, misses, weak, intensities }
     })
 }
 
 fn apply(naive: &mut Naive, model: &SensorModel, update: &BrickUpdate) {
     for (place, observation) in crate::space::places(update.touched()).zip(update.observations()) {
         let code = update.brick.voxel(place);
-        naive.insert(code, model.update(naive.get(&code).copied(), observation));
+        let before = naive.get(&code).copied();
+        let is_weak = observation == Observation::Miss && is_in_mask(&update.weak, place);
+        if !(is_weak && before.is_some()) {
+            naive.insert(code, model.update(before, observation));
+        }
     }
 }
 
@@ -73,7 +78,11 @@ proptest! {
         scans in prop::collection::vec((any::<bool>(), prop::collection::vec(any_update(), 1..24)), 1..4),
     ) {
         let (mut table, mut naive) = (Table::with_palette(palette), Naive::new());
-        for (whole, updates) in scans {
+        for (whole, mut updates) in scans {
+            if !whole {
+                // A single update is never weak.
+                updates.iter_mut().for_each(|update| update.weak = [0; 8]);
+            }
             updates.iter().for_each(|update| apply(&mut naive, &model, update));
             if whole {
                 table.update_bricks(&model, &updates);
@@ -121,8 +130,13 @@ fn steps_are_dropped_with_their_sensor_model() {
 #[test]
 fn evidence_is_stored_once_and_dropped_when_unused() {
     let model = SensorModel::default();
-    let all =
-        BrickUpdate { brick: BrickCode(5), hits: [0; 8], misses: [u64::MAX; 8], intensities: [].into() };
+    let all = BrickUpdate {
+        brick: BrickCode(5),
+        hits: [0; 8],
+        misses: [u64::MAX; 8],
+        weak: [0; 8],
+        intensities: [].into(),
+    };
     let mut table = Table::default();
     table.update_brick(&model, &all);
     let bytes = table.bytes();
@@ -148,6 +162,7 @@ fn bricks_store_states_beyond_the_palette_limit() {
                 brick: BrickCode(0x1000_0000 - u64::from(brick)),
                 hits: [u64::MAX; 8],
                 misses: [0; 8],
+                weak: [0; 8],
                 intensities,
             };
             table.update_brick(&model, &update);

@@ -11,7 +11,7 @@ use testkit::reference_map::voxels_of;
 use testkit::support::cases;
 use voxtile::sensor::{Iwlo, SensorModel};
 use voxtile::store::TileStore;
-use voxtile::{Aabb, InsertMode, MapQueries, MapReader};
+use voxtile::{Aabb, Clearing, Guard, InsertMode, MapQueries, MapReader};
 
 /// Tiles are removed and created again, and at the end all are removed.
 fn removals() -> Life {
@@ -162,9 +162,11 @@ fn random_lives_equal_the_naive_map_of_the_remaining_scans() {
         for insert_mode in [InsertMode::PerScan, InsertMode::PerRay] {
             configs.push(keeping_scans().with_sensor_model(sensor_model).with_insert_mode(insert_mode));
         }
+        let guarded = keeping_scans().with_sensor_model(sensor_model);
+        configs.push(guarded.with_clearing(Clearing::Guarded(Guard::default())));
     }
     for seed in 0..cases(12, 48) {
-        let life = Life::new(configs[seed as usize % 4].clone(), random_acts(&mut Random(seed)));
+        let life = Life::new(configs[seed as usize % configs.len()].clone(), random_acts(&mut Random(seed)));
         let disk = life.disk();
         for (number, act) in life.acts.iter().enumerate() {
             perform(&disk, &life.config, &life.states[number], act)

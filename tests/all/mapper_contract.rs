@@ -8,7 +8,7 @@ use voxtile::query::{MapQueries, Queries};
 use voxtile::scan::PointBatch;
 use voxtile::sensor::{Iwlo, SensorModel};
 use voxtile::space::{TileIndex, VoxelKey};
-use voxtile::{InsertMode, MapConfig, MapPath, Storage, VoxelCacheConfig, VoxelCacheMode};
+use voxtile::{Clearing, Guard, InsertMode, MapConfig, MapPath, Storage, VoxelCacheConfig, VoxelCacheMode};
 use voxtile_simulation::Survey;
 
 /// Small tiles, so that a scan of a few metres touches several.
@@ -23,6 +23,8 @@ fn configs() -> Vec<MapConfig> {
             let config = config().with_sensor_model(sensor_model).with_insert_mode(insert_mode);
             configs.push(config.with_range(0.5, 3.0));
         }
+        let guarded = config().with_sensor_model(sensor_model).with_range(0.5, 3.0);
+        configs.push(guarded.with_clearing(Clearing::Guarded(Guard::default())));
     }
     configs
 }

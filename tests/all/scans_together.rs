@@ -6,7 +6,7 @@ use testkit::unsynced_disk::UnsyncedDisk;
 use voxtile::sensor::{Iwlo, SensorModel};
 use voxtile::space::TileBox;
 use voxtile::{
-    InMemoryMapper, InsertMode, MapConfig, MapPath, MapQueries, MapReader, MapView, Mapper,
+    Clearing, Guard, InMemoryMapper, InsertMode, MapConfig, MapPath, MapQueries, MapReader, MapView, Mapper,
     OutOfCoreTileMapper, Scan, ScanPoints, ScanReport, Storage,
 };
 use voxtile_simulation::Survey;
@@ -36,7 +36,8 @@ fn configs() -> Vec<MapConfig> {
     let origin = config.grid.tile_of(scans()[0].origin).unwrap();
     region.rays.region = Some(TileBox::new(origin, origin));
     every_ray.rays.insert_mode = InsertMode::PerRay;
-    vec![config, iwlo, region, every_ray]
+    let guarded = region.clone().with_clearing(Clearing::Guarded(Guard::default()));
+    vec![config, iwlo, region, every_ray, guarded]
 }
 
 /// Returns the reports and the digest of scans that are inserted one by one.

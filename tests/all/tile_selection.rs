@@ -6,8 +6,8 @@ use voxtile::query::MapQueries;
 use voxtile::sensor::{Iwlo, SensorModel};
 use voxtile::store::InputRecord;
 use voxtile::{
-    Aabb, Error, InMemoryMapper, InsertMode, MapConfig, MapOptions, MapPath, MapReader, MapView, Mapper,
-    OutOfCoreTileMapper, TileBox, TileIndex, TileSelection,
+    Aabb, Clearing, Error, Guard, InMemoryMapper, InsertMode, MapConfig, MapOptions, MapPath, MapReader,
+    MapView, Mapper, OutOfCoreTileMapper, TileBox, TileIndex, TileSelection,
 };
 use voxtile_simulation::Survey;
 
@@ -18,6 +18,8 @@ fn configs() -> Vec<MapConfig> {
             let config = MapConfig::new(0.1, 1.6).unwrap().with_sensor_model(sensor_model);
             configs.push(config.with_insert_mode(insert_mode).with_range(0.5, 3.0));
         }
+        let guarded = MapConfig::new(0.1, 1.6).unwrap().with_sensor_model(sensor_model).with_range(0.5, 3.0);
+        configs.push(guarded.with_clearing(Clearing::Guarded(Guard::new(8).unwrap())));
     }
     configs
 }

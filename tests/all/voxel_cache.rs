@@ -7,8 +7,8 @@ use voxtile::scan::PointBatch;
 use voxtile::sensor::{Iwlo, SensorModel};
 use voxtile::space::{MortonCode, TileIndex, VoxelIndex, VoxelKey};
 use voxtile::tile::{OctreeStatistics, VoxelCacheCounts};
-use voxtile::{InMemoryMapper, InsertMode, MapConfig, MapPath, MapView, Mapper, OutOfCoreTileMapper};
-use voxtile::{MapQueries, VoxelCacheConfig, VoxelCacheMode};
+use voxtile::{Clearing, Guard, InMemoryMapper, InsertMode, MapConfig, MapPath, MapQueries, MapView, Mapper};
+use voxtile::{OutOfCoreTileMapper, VoxelCacheConfig, VoxelCacheMode};
 use voxtile_simulation::Survey;
 
 /// Every mode, with caches that hold nothing, little, and any number of voxels.
@@ -74,7 +74,9 @@ fn every_mode_gives_the_naive_map_and_its_maxima_whatever_the_threads_and_the_ma
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         for (number, mode) in modes().into_iter().enumerate() {
             let insert_mode = [InsertMode::PerRay, InsertMode::PerScan][number % 2];
-            let config = config().with_insert_mode(insert_mode).with_voxel_cache(mode);
+            let clearing = (number % 4 == 1).then(|| Clearing::Guarded(Guard::default()));
+            let config =
+                config().with_insert_mode(insert_mode).with_clearing(clearing).with_voxel_cache(mode);
             pool.install(|| {
                 let mut reference = ReferenceMap::new(&config);
                 let mut in_memory = InMemoryMapper::new(config.clone()).unwrap();

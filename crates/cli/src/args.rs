@@ -14,7 +14,9 @@ mod view;
 
 #[cfg(feature = "bucket")]
 pub use bucket::{PullArgs, PushArgs};
-pub use build::{BuildArgs, InsertName, ModelName, OctreeArgs, OctreeName, StorageName, VoxelCacheName};
+pub use build::{
+    BuildArgs, ClearingName, InsertName, ModelName, OctreeArgs, OctreeName, StorageName, VoxelCacheName,
+};
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use clap_complete::Shell;
 pub use edit::{ClearArgs, CropArgs, DecayArgs, MergeArgs, PartArgs};

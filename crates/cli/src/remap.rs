@@ -162,6 +162,7 @@ fn rays_of(args: &RemapArgs, own: &RayConfig) -> RayConfig {
         Some(InsertName::PerRay) => InsertMode::PerRay,
         None => rays.insert_mode,
     };
+    rays.clearing = args.clearing.map(Into::into).or(rays.clearing);
     rays
 }
 

@@ -90,6 +90,7 @@ fn for_this_run(
     let sensor_model = sensor_model(options, config.sensor_model)?;
     let mut config =
         config.with_sensor_model(sensor_model).with_insert_mode(insert_mode).with_octree(options.octree);
+    config.rays.clearing = options.clearing.or(config.rays.clearing);
     config.memory = options.memory;
     config.keeps_scans |= options.keep_scans;
     config.rays.no_return_range_m =

@@ -3,7 +3,7 @@ use crate::scan_queue::WhenBehind;
 use std::path::PathBuf;
 use std::time::Duration;
 use voxtile::space::Aabb;
-use voxtile::{InsertMode, MemoryLimit, OctreeConfig, Storage};
+use voxtile::{Clearing, InsertMode, MemoryLimit, OctreeConfig, Storage};
 use voxtile_formats::ReadOptions;
 
 /// Sensor model, without its parameters.
@@ -49,6 +49,8 @@ pub struct BuildOptions {
     pub intensity_max: Option<f64>,
     /// How often one scan can update a voxel. Default: once.
     pub insert_mode: Option<InsertMode>,
+    /// Rule for the voxels that rays pass. Default: the map's, OctoMap's for a new map.
+    pub clearing: Option<Clearing>,
     /// Whether the map keeps the scans. A map that keeps scans continues to do so.
     pub keep_scans: bool,
     /// Only tiles with their center in this box are updated.
@@ -97,6 +99,7 @@ impl BuildOptions {
             intensity_threshold: None,
             intensity_max: None,
             insert_mode: None,
+            clearing: None,
             keep_scans: false,
             region: None,
             clear_no_return_m: None,

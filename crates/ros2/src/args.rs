@@ -1,3 +1,4 @@
+use crate::clearing_rule::ClearingRule;
 use crate::names::Names;
 use crate::publishers::Extent;
 use crate::services::Rmw;
@@ -78,6 +79,9 @@ pub struct Args {
     /// Maximum occupancy probability of a voxel, for a new map [default: 0.971]
     #[arg(long, value_name = "P")]
     pub clamp_max: Option<f64>,
+    /// Which misses of a scan change a voxel, for a new map [default: octomap]
+    #[arg(long, value_name = "RULE")]
+    pub clearing: Option<ClearingRule>,
     /// Keep the scans in a new map, so that it can follow corrected trajectories
     #[arg(long)]
     pub keep_scans: bool,

@@ -10,6 +10,7 @@
 //! ```
 
 mod args;
+mod clearing_rule;
 mod cloud;
 mod cloud_points;
 mod cloud_queue;

@@ -17,7 +17,8 @@ use std::sync::mpsc::Receiver;
 use std::time::{Duration, Instant};
 use voxtile::operations::{self, OnlineRemap, Part};
 use voxtile::{
-    Aabb, Error, MapConfig, MapReader, MapView, Mapper, MemoryLimit, OutOfCoreTileMapper, Point, Stop,
+    Aabb, Clearing, Error, MapConfig, MapReader, MapView, Mapper, MemoryLimit, OutOfCoreTileMapper, Point,
+    Stop,
 };
 use voxtile_formats::RigidPose;
 use voxtile_formats::ros::Wire;
@@ -93,6 +94,7 @@ impl Mapping {
             Err(Error::NoMap { .. }) => {
                 let config = MapConfig::new(args.resolution, args.tile_size)?;
                 let config = config.with_sensor_model(args.sensor_model()?);
+                let config = config.with_clearing(args.clearing.map(Clearing::from));
                 let config = config.with_kept_scans(args.keep_scans || is_followed);
                 OutOfCoreTileMapper::create(&args.output, own(config))?
             }

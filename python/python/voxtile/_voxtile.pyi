@@ -52,6 +52,7 @@ _Scan: TypeAlias = tuple[ArrayLike, _Pose] | tuple[ArrayLike, _Pose, ArrayLike |
 _Unknown: TypeAlias = Literal["free", "obstacle"]
 _Storage: TypeAlias = Literal["octomap", "compact"]
 _InsertMode: TypeAlias = Literal["per-scan", "per-ray"]
+_Clearing: TypeAlias = Literal["octomap", "guarded"]
 _SensorModel: TypeAlias = Literal["log-odds", "iwlo"]
 _Probabilities: TypeAlias = Sequence[float]
 
@@ -122,6 +123,7 @@ class Map:
         min_range: float = 0.0,
         max_range: float | None = None,
         insert_mode: _InsertMode = "per-scan",
+        clearing: _Clearing = "octomap",
         sensor_model: _SensorModel = "log-odds",
         probabilities: _Probabilities | None = None,
         occupancy_threshold: float = 0.5,
@@ -260,6 +262,7 @@ def remap_as(
     min_range: float | None = None,
     max_range: float | None = None,
     insert_mode: _InsertMode | None = None,
+    clearing: _Clearing | None = None,
     storage: _Storage | None = None,
     keep_scans: bool = False,
     memory: int | str | None = None,

@@ -67,6 +67,7 @@ class BuildOptions(ReadOptions, total=False):
     intensity_threshold: float
     intensity_max: float
     insert_mode: Literal["per-scan", "per-ray"]
+    clearing: Literal["octomap", "guarded"]
     keep_scans: bool
     region: _Corners | None
     clear_no_return: float | None

@@ -1,12 +1,12 @@
 use super::completion::release;
 use super::filtered_scan::FilteredScan;
 use super::replay::{Replay, Replayed};
-use crate::config::MapConfig;
+use crate::config::{GUARD_REACH, MapConfig};
 use crate::error::Result;
 use crate::mapper::{KeptScan, KeptSummary, Remapper, TileFinder};
 use crate::persistence::config_from;
 use crate::scan::{Pose, ScanPoints, ScanReport};
-use crate::space::{Aabb, TileIndex, TileSelection};
+use crate::space::{Aabb, TileBox, TileIndex, TileSelection};
 use crate::store::{CatalogEntry, Disk, KeptRecord, Layout, TileStore};
 use rustc_hash::{FxHashMap, FxHashSet};
 use std::collections::BTreeSet;
@@ -130,6 +130,13 @@ impl Revision {
                 Change::Remove => Vec::new(),
             });
             *looked_at += updates;
+        }
+        let removes_points = self.changes.values().any(|change| matches!(change, Change::Filter(_)));
+        if removes_points && config.rays.clearing().guard().is_some() {
+            // Without a point, misses of other rays nearby may count in full, also in tiles that its ray did not pass.
+            let reach = config.grid.tiles_within(GUARD_REACH);
+            let near = |tile| TileBox::new(tile, tile).grown(reach).tiles();
+            tiles = tiles.into_iter().flat_map(near).filter(|tile| store.tiles().contains(*tile)).collect();
         }
         Ok(tiles)
     }

@@ -32,6 +32,14 @@ pub(crate) struct MarkedBrick {
     pub(crate) passed: BrickMask,
 }
 
+impl MarkedBrick {
+    /// Voxels that rays pass and that are not hit.
+    #[inline]
+    pub(crate) fn misses(&self) -> BrickMask {
+        std::array::from_fn(|word| self.passed[word] & !self.hits[word])
+    }
+}
+
 /// One bit for each voxel of the page in Morton order, so that eight words are the mask of a brick. Marking a voxel is
 /// one operation on one word and needs no look-up of a brick.
 #[derive(Clone, Debug)]
@@ -236,8 +244,13 @@ impl MarkedPage {
 
     fn present(&self) -> BrickMask {
         let passed = self.passed.present();
-        let hits = self.hits.as_deref().map_or([0; 8], present_in);
+        let hits = self.hit_bricks();
         std::array::from_fn(|word| passed[word] | hits[word])
+    }
+
+    /// Mask of the bricks that have hits.
+    pub(crate) fn hit_bricks(&self) -> BrickMask {
+        self.hits.as_deref().map_or([0; 8], present_in)
     }
 
     /// Masks of a brick: voxels in which rays end, and voxels that rays pass, including those that are also hit.

@@ -99,6 +99,15 @@ impl<F: Footprint> PageMap<F> {
         number
     }
 
+    /// The number of the page with an index, if it exists.
+    #[inline]
+    pub(crate) fn find(&self, index: VoxelIndex) -> Option<usize> {
+        match self.window.local(index.map(|k| k.wrapping_mul(PAGE_EDGE as i32))) {
+            Some(local) => (self.directory[self.window.page_of(local)] as usize).checked_sub(1),
+            None => self.far.get(&index).map(|&number| number as usize),
+        }
+    }
+
     pub(crate) fn pages(&self) -> &[F] {
         &self.pages
     }

@@ -138,7 +138,7 @@ impl PerRayCollector {
         };
         for (number, some) in indices.chunks(bricks_at_a_time).enumerate() {
             let first = number * bricks_at_a_time;
-            let tiles = bricks_by_tile(mapped, some).into_par_iter();
+            let tiles = bricks_by_tile(mapped, some, 0).into_par_iter();
             let runs: Vec<_> = tiles.map(|(tile, numbers)| runs_of_tile(first, tile, numbers)).collect();
             runs.into_iter().for_each(|(tile, runs)| visit(tile, runs));
         }

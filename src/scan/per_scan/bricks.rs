@@ -1,22 +1,28 @@
+use crate::scan::clearing::{BrickMarks, Clearance};
 use crate::scan::pages::MarkedBrick;
-use crate::scan::updates::{BrickUpdate, MappedTiles, brick_code, bricks_by_tile, part_in_tile};
-use crate::space::{BRICK_EDGE, BrickMask, Grid, MortonCode, TileIndex, VoxelIndex, VoxelKey, places};
+use crate::scan::updates::{BrickUpdate, MappedTiles, brick_code, brick_index, bricks_by_tile, part_in_tile};
+use crate::space::{
+    BRICK_EDGE, BrickMask, Grid, MortonCode, TileIndex, VoxelIndex, VoxelKey, is_in_mask, places,
+};
 use rayon::prelude::*;
 use rustc_hash::FxHashMap;
 
 /// Largest intensity of each hit voxel; empty for sensor models that need none.
 pub(crate) type Intensities = FxHashMap<VoxelIndex, f32>;
 
-/// Returns the updates of marked bricks by mapped tile, in Morton order. Bricks across a tile border are split.
+/// Returns the updates of marked bricks by mapped tile, in Morton order. Bricks across a tile border are split. `weak`
+/// returns the weak misses of a brick by its index.
 pub(crate) fn updates_by_tile(
     mapped: MappedTiles<'_>,
     bricks: &[MarkedBrick],
     intensities: &Intensities,
+    weak: impl Fn(VoxelIndex) -> BrickMask + Sync,
 ) -> Vec<(TileIndex, Vec<BrickUpdate>)> {
     let indices: Vec<VoxelIndex> = bricks.iter().map(|brick| brick.index).collect();
-    let updates = bricks_by_tile(mapped, &indices)
-        .into_par_iter()
-        .map(|(tile, numbers)| (tile, updates_of_tile(mapped.grid, tile, bricks, &numbers, intensities)));
+    let updates = bricks_by_tile(mapped, &indices, 0).into_par_iter().map(|(tile, numbers)| {
+        let of_tile = numbers.iter().map(|&number| &bricks[number as usize]);
+        (tile, updates_of_tile(mapped.grid, tile, of_tile, intensities, &weak))
+    });
     let mut tiles: Vec<(TileIndex, Vec<BrickUpdate>)> = updates.collect();
     tiles.retain(|(_, bricks)| !bricks.is_empty());
     tiles
@@ -37,30 +43,83 @@ pub(crate) fn add_bricks(
     tiles.extend(others);
 }
 
-fn updates_of_tile(
+/// Returns the marks of bricks by mapped tile, in Morton order, for a rule that needs their surroundings: each tile gets
+/// the whole bricks that are within `reach` voxels. Hits and misses are those of the marks.
+pub(crate) fn marks_by_tile(
+    mapped: MappedTiles<'_>,
+    bricks: &[MarkedBrick],
+    intensities: &Intensities,
+    reach: i32,
+) -> Vec<(TileIndex, Vec<BrickUpdate>)> {
+    let indices: Vec<VoxelIndex> = bricks.iter().map(|brick| brick.index).collect();
+    let marks = |number: u32| {
+        let brick = &bricks[number as usize];
+        BrickUpdate {
+            brick: brick_code(brick.index),
+            hits: brick.hits,
+            misses: brick.misses(),
+            weak: [0; 8],
+            intensities: intensities_of(brick.index, &brick.hits, intensities),
+        }
+    };
+    bricks_by_tile(mapped, &indices, reach)
+        .into_iter()
+        .map(|(tile, numbers)| (tile, numbers.into_iter().map(marks).collect()))
+        .collect()
+}
+
+/// Returns the updates of a tile from its marks and those around it, in Morton order, as by [`marks_by_tile`].
+pub(crate) fn guarded_updates(
     grid: &Grid,
     tile: TileIndex,
-    bricks: &[MarkedBrick],
-    numbers: &[u32],
-    intensities: &Intensities,
+    marks: &[BrickUpdate],
+    clearance: &Clearance,
 ) -> Vec<BrickUpdate> {
-    let update = |&number: &u32| {
-        let MarkedBrick { index, mut hits, passed: mut misses } = bricks[number as usize];
+    let marked = |update: &BrickUpdate| MarkedBrick {
+        index: brick_index(grid, tile, update.brick),
+        hits: update.hits,
+        passed: update.misses,
+    };
+    let around: BrickMarks = marks.iter().map(marked).collect();
+    let of_tile = |update: &BrickUpdate| {
+        let index = brick_index(grid, tile, update.brick);
+        let part = part_in_tile(grid, tile, index);
+        let within = |mask: &BrickMask| -> BrickMask { std::array::from_fn(|word| mask[word] & part[word]) };
+        let (hits, misses) = (within(&update.hits), within(&update.misses));
+        if hits == [0; 8] && misses == [0; 8] {
+            return None;
+        }
+        let weak = within(&clearance.weak_misses(index, &around));
+        let all = places(update.hits).zip(&update.intensities);
+        let intensities = all.filter(|(place, _)| is_in_mask(&hits, *place)).map(|(_, &intensity)| intensity);
+        Some(BrickUpdate { brick: update.brick, hits, misses, weak, intensities: intensities.collect() })
+    };
+    marks.iter().filter_map(of_tile).collect()
+}
+
+fn updates_of_tile<'a>(
+    grid: &Grid,
+    tile: TileIndex,
+    bricks: impl Iterator<Item = &'a MarkedBrick>,
+    intensities: &Intensities,
+    weak: impl Fn(VoxelIndex) -> BrickMask,
+) -> Vec<BrickUpdate> {
+    let update = |&MarkedBrick { index, mut hits, passed: mut misses }: &MarkedBrick| {
         let part = part_in_tile(grid, tile, index);
         for word in 0..8 {
             hits[word] &= part[word];
             misses[word] &= part[word] & !hits[word];
         }
         let is_empty = hits == [0; 8] && misses == [0; 8];
-        let intensities = || intensities_of(index, &hits, intensities);
-        (!is_empty).then(|| BrickUpdate {
-            brick: brick_code(index),
-            hits,
-            misses,
-            intensities: intensities(),
-        })
+        let update = || {
+            let (brick, intensities) = (brick_code(index), intensities_of(index, &hits, intensities));
+            let weak = weak(index);
+            let weak = std::array::from_fn(|word| weak[word] & misses[word]);
+            BrickUpdate { brick, hits, misses, weak, intensities }
+        };
+        (!is_empty).then(update)
     };
-    numbers.iter().filter_map(update).collect()
+    bricks.filter_map(update).collect()
 }
 
 /// The intensities of the given hits of a brick, in the order of the mask.
@@ -84,7 +143,7 @@ pub(crate) fn hits_and_misses(bricks: &[BrickUpdate]) -> (u64, u64) {
 }
 
 /// Merges two parts of one scan for a tile. Each voxel occurs once: a hit overrides a miss, and the largest intensity
-/// of its hits is used. Both parts and the result are in Morton order and contain each brick once.
+/// of its hits is used. No miss is weak yet. Both parts and the result are in Morton order and contain each brick once.
 pub(crate) fn merge_bricks(a: Vec<BrickUpdate>, b: Vec<BrickUpdate>) -> Vec<BrickUpdate> {
     let mut all = Vec::with_capacity(a.len() + b.len());
     let (mut a, mut b) = (a.into_iter().peekable(), b.into_iter().peekable());
@@ -113,7 +172,7 @@ fn merge_brick(a: &BrickUpdate, b: &BrickUpdate) -> BrickUpdate {
         a.into_iter().chain(b).max_by(f32::total_cmp).unwrap_or_default()
     };
     let intensities = if has_intensities { places(hits).map(largest).collect() } else { Box::default() };
-    BrickUpdate { brick: a.brick, hits, misses, intensities }
+    BrickUpdate { brick: a.brick, hits, misses, weak: [0; 8], intensities }
 }
 
 #[cfg(test)]
@@ -151,7 +210,7 @@ mod tests {
                     std::array::from_fn(|word| h[word] & h[(word + 1) % 8] & p[(word + 3) % 8]);
                 let misses = std::array::from_fn(|word| p[word] & !hits[word]);
                 let intensities = places(hits).map(|place| ((place as u32 * 7 + i) % 50) as f32).collect();
-                BrickUpdate { brick: BrickCode(code), hits, misses, intensities }
+                BrickUpdate { brick: BrickCode(code), hits, misses, weak: [0; 8], intensities }
             };
             bricks.into_iter().map(brick).collect()
         })

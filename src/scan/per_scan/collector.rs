@@ -1,14 +1,16 @@
 use super::bricks::{Intensities, add_bricks, hits_and_misses, updates_by_tile};
 use super::far_bricks::FarBricks;
+use super::page_marks::PageMarks;
 use super::page_updates::updates_of_pages;
 use crate::scan::ScanReport;
+use crate::scan::clearing::Clearance;
 use crate::scan::coherence::MarkedPrefixes;
 use crate::scan::pages::{Footprint, MarkedBrick, MarkedPage, PAGE_EDGE, PageMap, Window};
 use crate::scan::ray::{RayCut, RayEnd, RayOrigin, SlabRay};
 use crate::scan::spill::ScanParts;
 use crate::scan::trace::{Allowance, CollectorLimit};
 use crate::scan::updates::{BrickUpdate, MappedTiles, ScanUpdates, TileUpdates, in_order_of_tiles};
-use crate::space::{TileIndex, VoxelIndex, hash_table_bytes};
+use crate::space::{BrickMask, TileIndex, VoxelIndex, hash_table_bytes};
 use rayon::prelude::*;
 
 /// Maximum number of rays per call of [`PerScanCollector::take`].
@@ -168,9 +170,24 @@ impl PerScanCollector {
     }
 
     /// Returns the updates. Bricks across a tile border are split.
-    pub(crate) fn updates(&mut self, mapped: MappedTiles<'_>, mut report: ScanReport) -> ScanUpdates {
+    pub(crate) fn updates(
+        &mut self,
+        mapped: MappedTiles<'_>,
+        clearance: Option<&Clearance>,
+        mut report: ScanReport,
+    ) -> ScanUpdates {
         // One scope for all steps, because each transfer to the pool costs a thread switch.
-        let tiles = rayon::scope(|_| self.updates_by_tile(mapped));
+        let tiles = rayon::scope(|_| {
+            self.pages.pages_mut().par_iter_mut().for_each(MarkedPage::find_bricks);
+            self.far.put_latest_in();
+            match clearance {
+                None => self.updates_by_tile(mapped, |_| [0; 8]),
+                Some(clearance) => {
+                    let marks = PageMarks::new(&self.pages, &self.far);
+                    self.updates_by_tile(mapped, |brick| clearance.weak_misses(brick, &marks))
+                }
+            }
+        });
         let tiles: Vec<_> = tiles
             .into_iter()
             .map(|(tile, bricks)| {
@@ -183,19 +200,22 @@ impl PerScanCollector {
         in_order_of_tiles(mapped.grid, tiles, report)
     }
 
-    fn updates_by_tile(&mut self, mapped: MappedTiles<'_>) -> Vec<(TileIndex, Vec<BrickUpdate>)> {
-        self.pages.pages_mut().par_iter_mut().for_each(MarkedPage::find_bricks);
+    fn updates_by_tile(
+        &self,
+        mapped: MappedTiles<'_>,
+        weak: impl Fn(VoxelIndex) -> BrickMask + Sync,
+    ) -> Vec<(TileIndex, Vec<BrickUpdate>)> {
         let mut tiles = if mapped.grid.voxels_per_tile_edge() >= PAGE_EDGE as i32 / 2 {
-            updates_of_pages(mapped, &self.pages, &self.intensities)
+            updates_of_pages(mapped, &self.pages, &self.intensities, &weak)
         } else {
             // A page would overlap hundreds of tiles.
             let pages = self.pages.pages().iter().zip(self.pages.indices());
             let bricks: Vec<MarkedBrick> = pages.flat_map(|(page, index)| page.bricks(*index)).collect();
-            updates_by_tile(mapped, &bricks, &self.intensities)
+            updates_by_tile(mapped, &bricks, &self.intensities, &weak)
         };
-        let far = self.far.take();
-        if !far.is_empty() {
-            add_bricks(&mut tiles, updates_by_tile(mapped, &far, &self.intensities));
+        if !self.far.is_empty() {
+            let far: Vec<MarkedBrick> = self.far.iter().copied().collect();
+            add_bricks(&mut tiles, updates_by_tile(mapped, &far, &self.intensities, &weak));
         }
         tiles
     }

@@ -33,7 +33,8 @@ impl FarBricks {
         self.latest.get_or_insert(MarkedBrick { index, hits: [0; 8], passed: [0; 8] })
     }
 
-    fn put_latest_in(&mut self) {
+    /// Completes the bricks for [`FarBricks::get`].
+    pub(crate) fn put_latest_in(&mut self) {
         if let Some(latest) = self.latest.take() {
             self.absorb_brick(&latest);
         }
@@ -52,8 +53,13 @@ impl FarBricks {
         others.iter().for_each(|other| self.absorb_brick(other));
     }
 
-    fn iter(&self) -> impl Iterator<Item = &MarkedBrick> {
+    pub(crate) fn iter(&self) -> impl Iterator<Item = &MarkedBrick> {
         self.bricks.values().chain(&self.latest)
+    }
+
+    /// The marks of a brick, if it has any.
+    pub(crate) fn get(&self, brick: VoxelIndex) -> Option<&MarkedBrick> {
+        self.bricks.get(&brick)
     }
 
     /// Removes and returns the bricks, each once.
@@ -67,7 +73,6 @@ impl FarBricks {
         self.latest = None;
     }
 
-    #[cfg(test)]
     pub(crate) fn is_empty(&self) -> bool {
         self.iter().next().is_none()
     }

@@ -5,7 +5,10 @@
 mod bricks;
 mod collector;
 mod far_bricks;
+mod page_marks;
 mod page_updates;
 
-pub(crate) use bricks::{Intensities, hits_and_misses, merge_bricks, updates_by_tile};
+pub(crate) use bricks::{
+    Intensities, guarded_updates, hits_and_misses, marks_by_tile, merge_bricks, updates_by_tile,
+};
 pub(crate) use collector::{BATCH, PerScanCollector};

@@ -8,12 +8,14 @@ use rayon::prelude::*;
 use rustc_hash::FxHashMap;
 
 /// Returns the updates of the marks in pages by mapped tile, in Morton order. Bricks across a tile border are split.
+/// `weak` returns the weak misses of a brick by its index.
 ///
 /// Tiles are looked up once per page, not per brick, and only pages are sorted.
 pub(crate) fn updates_of_pages(
     mapped: MappedTiles<'_>,
     pages: &PageMap<MarkedPage>,
     intensities: &Intensities,
+    weak: impl Fn(VoxelIndex) -> BrickMask + Sync,
 ) -> Vec<(TileIndex, Vec<BrickUpdate>)> {
     let mut in_order: Vec<Page<'_>> = pages
         .pages()
@@ -24,7 +26,7 @@ pub(crate) fn updates_of_pages(
     in_order.sort_unstable_by_key(|page| page.code);
     let updates = pages_by_tile(mapped, &in_order).into_par_iter().map(|(tile, numbers)| {
         let of_tile = numbers.iter().map(|&number| &in_order[number as usize]);
-        (tile, updates_of_tile(mapped.grid, tile, of_tile, intensities))
+        (tile, updates_of_tile(mapped.grid, tile, of_tile, intensities, &weak))
     });
     let mut tiles: Vec<(TileIndex, Vec<BrickUpdate>)> = updates.collect();
     tiles.retain(|(_, bricks)| !bricks.is_empty());
@@ -67,6 +69,7 @@ fn updates_of_tile<'a>(
     tile: TileIndex,
     pages: impl Iterator<Item = &'a Page<'a>> + Clone,
     intensities: &Intensities,
+    weak: impl Fn(VoxelIndex) -> BrickMask,
 ) -> Vec<BrickUpdate> {
     let parts = pages.map(|page| (page, PagePart::new(grid, tile, page)));
     let most = parts
@@ -86,10 +89,13 @@ fn updates_of_tile<'a>(
             }
             (0..8).for_each(|word| misses[word] &= !hits[word]);
             if (0..8).fold(0, |all, word| all | hits[word] | misses[word]) != 0 {
+                let mut weak = weak(index);
+                (0..8).for_each(|word| weak[word] &= misses[word]);
                 updates.push(BrickUpdate {
                     brick: BrickCode(page.code.0 | place as u64),
                     hits,
                     misses,
+                    weak,
                     intensities: intensities_of(index, &hits, intensities),
                 });
             }
@@ -172,10 +178,10 @@ mod tests {
             let bricks: Vec<_> =
                 pages.pages().iter().zip(pages.indices()).flat_map(|(page, index)| page.bricks(*index)).collect();
             let none = Intensities::default();
-            let mut expected = updates_by_tile(mapped, &bricks, &none);
-            let mut updates = updates_of_pages(mapped, &pages, &none);
+            let mut expected = updates_by_tile(mapped, &bricks, &none, |_| [0; 8]);
+            let mut updates = updates_of_pages(mapped, &pages, &none, |_| [0; 8]);
             pages.pages_mut().iter_mut().for_each(MarkedPage::find_bricks);
-            let mut found = updates_of_pages(mapped, &pages, &none);
+            let mut found = updates_of_pages(mapped, &pages, &none, |_| [0; 8]);
             for tiles in [&mut expected, &mut updates, &mut found] {
                 tiles.sort_by_key(|(tile, _)| *tile);
             }

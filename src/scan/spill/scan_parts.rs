@@ -1,7 +1,11 @@
 use super::overflow::Overflow;
 use super::part_log::{MakeScratch, NONE, PartLog};
+use crate::config::GUARD_REACH;
+use crate::scan::clearing::Clearance;
 use crate::scan::pages::MarkedBrick;
-use crate::scan::per_scan::{Intensities, hits_and_misses, merge_bricks, updates_by_tile};
+use crate::scan::per_scan::{
+    Intensities, guarded_updates, hits_and_misses, marks_by_tile, merge_bricks, updates_by_tile,
+};
 use crate::scan::stop::Stop;
 use crate::scan::updates::{
     BrickUpdate, MappedTiles, ScanUpdates, TileUpdates, in_order_of_tiles, mean_tiles_of_brick,
@@ -18,6 +22,9 @@ use std::sync::{Mutex, PoisonError};
 /// parts of a tile are concatenated.
 pub(crate) struct ScanParts<'a> {
     mapped: MappedTiles<'a>,
+    /// Rule for weak misses. Parts then have all marks within its reach of the tile, and the rule is applied to the
+    /// merged parts.
+    clearance: Option<Clearance>,
     parts: Mutex<Parts<'a>>,
     stop: &'a Stop,
     is_empty: AtomicBool,
@@ -76,6 +83,7 @@ impl<'a> ScanParts<'a> {
     /// raised, parts are dropped.
     pub(crate) fn new(
         mapped: MappedTiles<'a>,
+        clearance: Option<Clearance>,
         stop: &'a Stop,
         max_bytes: usize,
         max_tiles: usize,
@@ -85,6 +93,7 @@ impl<'a> ScanParts<'a> {
         let (record, lists, failure) = Default::default();
         Self {
             mapped,
+            clearance,
             parts: Mutex::new(Parts { log, record, lists, max_tiles, failure }),
             stop,
             is_empty: AtomicBool::new(true),
@@ -94,7 +103,7 @@ impl<'a> ScanParts<'a> {
 
     /// Creates a collection that accepts no parts: adding one fails, and collecting ends.
     pub(crate) fn refused(mapped: MappedTiles<'a>, stop: &'a Stop) -> Self {
-        Self::new(mapped, stop, 0, 0, &|| Err(io::ErrorKind::Unsupported.into()))
+        Self::new(mapped, None, stop, 0, 0, &|| Err(io::ErrorKind::Unsupported.into()))
     }
 
     pub(crate) fn is_empty(&self) -> bool {
@@ -115,8 +124,11 @@ impl<'a> ScanParts<'a> {
         while !self.stop.is_set() && bricks.peek().is_some() {
             some.clear();
             some.extend(bricks.by_ref().take(at_a_time));
-            let tiles = updates_by_tile(self.mapped, &some, intensities).into_iter();
-            self.add(tiles.map(|(tile, bricks)| {
+            let tiles = match self.clearance {
+                None => updates_by_tile(self.mapped, &some, intensities, |_| [0; 8]),
+                Some(_) => marks_by_tile(self.mapped, &some, intensities, GUARD_REACH),
+            };
+            self.add(tiles.into_iter().map(|(tile, bricks)| {
                 let counts = hits_and_misses(&bricks);
                 (tile, TileUpdates::Masks(bricks), counts)
             }));
@@ -159,12 +171,19 @@ impl<'a> ScanParts<'a> {
         }
         let lists = std::mem::take(&mut parts.lists);
         let mut output = OutputBuffer { tiles: Vec::new(), bytes: 0 };
+        let mut tiles_touched = 0;
         for (tile, list) in lists.iter() {
             stop.check()?;
             let records = parts.records_of(&list).map_err(|error| overflow.error(error))?;
-            let (hits, misses) = match is_per_scan && list.count > 1 {
+            let (hits, misses) = match is_per_scan && (list.count > 1 || self.clearance.is_some()) {
                 true => {
-                    let bricks = parts.merged(&records).map_err(|error| overflow.error(error))?;
+                    let mut bricks = parts.merged(&records).map_err(|error| overflow.error(error))?;
+                    if let Some(clearance) = &self.clearance {
+                        bricks = guarded_updates(self.mapped.grid, tile, &bricks, clearance);
+                        if bricks.is_empty() {
+                            continue;
+                        }
+                    }
                     let counts = hits_and_misses(&bricks);
                     output.push(tile, PackedUpdates::of(&TileUpdates::Masks(bricks)), overflow)?;
                     counts
@@ -179,11 +198,12 @@ impl<'a> ScanParts<'a> {
             };
             report.hits += hits;
             report.misses += misses;
+            tiles_touched += 1;
         }
         let tiles =
             output.tiles.into_iter().map(|(tile, packed)| (tile, TileUpdates::Packed(packed))).collect();
         let mut updates = in_order_of_tiles(self.mapped.grid, tiles, report);
-        updates.report.tiles_touched = lists.len() as u64;
+        updates.report.tiles_touched = tiles_touched;
         Ok(updates)
     }
 }

@@ -5,6 +5,7 @@ use crate::error::Result;
 use crate::scan::scan_points::ScanPoints;
 use crate::scan::spill::ScanParts;
 use crate::scan::updates::ScanUpdates;
+use crate::space::TileSelection;
 use rayon::prelude::*;
 
 impl ScanTracer {
@@ -23,12 +24,13 @@ impl ScanTracer {
     ) -> Vec<Result<Option<ScanUpdates>>> {
         let selection = rules.selection();
         let rules = rules.with_selection(selection.as_deref());
+        let traced_tiles = rules.traced();
         let max_threads = (rayon::current_num_threads() / scans.len().max(1)).max(1);
         let mut tracers = self.divided(scans.len(), max_threads);
         let traced = tracers
             .par_iter_mut()
             .zip(scans)
-            .map(|(tracer, scan)| tracer.trace_whole(rules, *scan, max_threads))
+            .map(|(tracer, scan)| tracer.trace_whole(rules, traced_tiles.as_deref(), *scan, max_threads))
             .collect();
         for mut tracer in tracers {
             self.per_scan.append(&mut tracer.per_scan);
@@ -63,10 +65,11 @@ impl ScanTracer {
     fn trace_whole(
         &mut self,
         rules: TraceRules<'_>,
+        traced: Option<&TileSelection>,
         scan: &dyn ScanPoints,
         max_threads: usize,
     ) -> Result<Option<ScanUpdates>> {
-        let scan_rays = ScanRays::new(rules, scan, max_threads, &self.stop)?;
+        let scan_rays = ScanRays::new(rules, traced, scan, max_threads, &self.stop)?;
         let updates = match (rules.rays.insert_mode, self.limit.is_none()) {
             (InsertMode::PerScan, true) => scan_rays.per_scan(&mut self.per_scan)?,
             (InsertMode::PerScan, false) => {

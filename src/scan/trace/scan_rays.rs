@@ -3,6 +3,7 @@ use super::trace_limit::{CollectorLimit, TraceLimit};
 use crate::config::RayConfig;
 use crate::error::Result;
 use crate::scan::ScanReport;
+use crate::scan::clearing::Clearance;
 use crate::scan::coherence::{sampling_passes, single_pass};
 use crate::scan::pages::{MAX_RAYS, Window};
 use crate::scan::per_ray::{OrderedCollector, PerRayCollector, drain_in_order, updates_in_order};
@@ -15,7 +16,7 @@ use crate::scan::spill::ScanParts;
 use crate::scan::stop::Stop;
 use crate::scan::updates::{MappedTiles, ScanUpdates};
 use crate::sensor::{Observation, SensorModel};
-use crate::space::{Grid, Point};
+use crate::space::{Grid, Point, TileSelection};
 use rayon::prelude::*;
 use std::ops::Range;
 
@@ -33,8 +34,10 @@ pub(crate) struct ScanRays<'a> {
     points: &'a dyn ScanPoints,
     origin_m: Point,
     origin: RayOrigin,
-    /// Clips rays to the mapped tiles; `None` if the whole space is mapped.
+    /// Clips rays to the traced tiles; `None` for the whole space.
     cut: Option<RayCut<'a>>,
+    /// Rule for weak misses, if the map has one.
+    clearance: Option<Clearance>,
     window: Window,
     range: RangeRule,
     /// Maximum number of threads.
@@ -51,8 +54,10 @@ pub(crate) enum PerScanUpdates {
 }
 
 impl<'a> ScanRays<'a> {
+    /// `traced` are the mapped tiles and those around them that the rule of clearing needs.
     pub(crate) fn new(
         rules: TraceRules<'a>,
+        traced: Option<&'a TileSelection>,
         points: &'a dyn ScanPoints,
         max_threads: usize,
         stop: &'a Stop,
@@ -63,13 +68,30 @@ impl<'a> ScanRays<'a> {
         let grid = mapped.grid;
         let voxel = origin_voxel(grid, origin_m)?;
         let origin = RayOrigin::new(grid.to_voxel_units(origin_m), voxel);
-        let cut = mapped.selection.map(|tiles| RayCut::new(grid, tiles, &origin));
+        let cut = traced.map(|tiles| RayCut::new(grid, tiles, &origin));
+        let clearance = rules.guard().map(|guard| Clearance::new(guard, voxel));
         let range = RangeRule::new(rays, origin_m);
         let window = Window::default();
-        let mut scan_rays =
-            Self { mapped, model, rays, points, origin_m, origin, cut, window, range, max_threads, stop };
+        let mut scan_rays = Self {
+            mapped,
+            model,
+            rays,
+            points,
+            origin_m,
+            origin,
+            cut,
+            clearance,
+            window,
+            range,
+            max_threads,
+            stop,
+        };
         scan_rays.window = Window::around(voxel, scan_rays.bounds()?);
         Ok(scan_rays)
+    }
+
+    pub(crate) fn clearance(&self) -> Option<Clearance> {
+        self.clearance
     }
 
     /// Insertion per scan: one update per voxel, a hit overrides any miss. The result does not depend on the order of
@@ -102,7 +124,7 @@ impl<'a> ScanRays<'a> {
     fn merge(&self, collectors: &mut [PerScanCollector], report: ScanReport) -> ScanUpdates {
         let (first, others) = collectors.split_at_mut(1);
         others.iter().for_each(|other| first[0].absorb(other));
-        first[0].updates(self.mapped, report)
+        first[0].updates(self.mapped, self.clearance.as_ref(), report)
     }
 
     fn collect_per_scan<'c>(

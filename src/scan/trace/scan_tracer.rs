@@ -1,6 +1,6 @@
 use super::scan_rays::{PerScanUpdates, ScanRays};
 use super::trace_limit::TraceLimit;
-use crate::config::{InsertMode, RayConfig};
+use crate::config::{GUARD_REACH, Guard, InsertMode, RayConfig};
 use crate::error::{Error, Result};
 use crate::scan::per_ray::PerRayCollector;
 use crate::scan::per_scan::PerScanCollector;
@@ -109,7 +109,9 @@ impl ScanTracer {
         let selection = rules.selection();
         let rules = rules.with_selection(selection.as_deref());
         let TraceRules { mapped, rays, .. } = rules;
-        let scan_rays = ScanRays::new(rules, scan, rayon::current_num_threads(), &self.stop)?;
+        let traced = rules.traced();
+        let threads = rayon::current_num_threads();
+        let scan_rays = ScanRays::new(rules, traced.as_deref(), scan, threads, &self.stop)?;
         let is_per_scan = rays.insert_mode == InsertMode::PerScan;
         let in_order = rules.are_rays_in_order();
         let Some(mut overflow) = overflow else {
@@ -121,6 +123,7 @@ impl ScanTracer {
         };
         let parts = ScanParts::new(
             mapped,
+            scan_rays.clearance(),
             &self.stop,
             overflow.max_bytes / 4,
             overflow.max_tiles,
@@ -176,6 +179,21 @@ impl<'a> TraceRules<'a> {
         'a: 'b,
     {
         TraceRules { mapped: MappedTiles { grid: self.mapped.grid, selection }, ..self }
+    }
+
+    /// The guard of the rule of clearing, if it has one.
+    pub(super) fn guard(&self) -> Option<Guard> {
+        self.rays.clearing().guard().filter(|_| self.rays.insert_mode == InsertMode::PerScan)
+    }
+
+    /// The tiles in which rays are traced: the selected tiles and, with guarded clearing, those within its reach;
+    /// `None` for the whole space.
+    pub(super) fn traced(&self) -> Option<Cow<'a, TileSelection>> {
+        let selection = self.mapped.selection?;
+        Some(match self.guard() {
+            None => Cow::Borrowed(selection),
+            Some(_) => Cow::Owned(selection.grown(self.mapped.grid.tiles_within(GUARD_REACH))),
+        })
     }
 
     /// Returns whether all updates of a tile must be in the order of the rays.

@@ -20,7 +20,7 @@ pub(crate) struct CollectorLimit {
 /// Size of a fast page: one bit per voxel, and at most as much again for hits and the numbers of their bricks.
 const FAST_PAGE_BYTES: usize = 66 << 10;
 /// Bytes of a brick while its marks are converted to updates, which are in three lists.
-const UPDATE_BYTES: usize = 450;
+const UPDATE_BYTES: usize = 530;
 /// With less memory, a collector would be drained constantly.
 const MIN_COLLECTOR_BYTES: usize = 4 << 20;
 

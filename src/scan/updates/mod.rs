@@ -9,7 +9,7 @@ mod tile_updates;
 pub(crate) use mapped_tiles::MappedTiles;
 pub use packed_updates::PackedUpdates;
 pub(crate) use tile_order::{
-    brick_code, bricks_by_tile, in_order_of_tiles, mean_tiles_of_brick, part_in_tile,
+    brick_code, brick_index, bricks_by_tile, in_order_of_tiles, mean_tiles_of_brick, part_in_tile,
 };
 pub use tile_runs::{BrickRuns, Misses, Run, TileRuns};
 pub use tile_updates::{BrickUpdate, OrderedUpdates, ScanUpdates, TileUpdates};

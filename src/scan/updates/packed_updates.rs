@@ -15,6 +15,8 @@ pub struct PackedUpdates {
 const MASKS: u8 = 0;
 const RUNS: u8 = 1;
 const ORDERED: u8 = 2;
+/// As `MASKS`, each brick with its weak misses.
+const GUARDED_MASKS: u8 = 3;
 
 impl PackedUpdates {
     /// Appends the updates of one scan.
@@ -26,13 +28,17 @@ impl PackedUpdates {
         let out = &mut Packer { bytes: &mut self.bytes };
         match updates {
             TileUpdates::Masks(bricks) => {
-                out.byte(MASKS);
+                let has_weak = bricks.iter().any(|brick| brick.weak != [0; 8]);
+                out.byte(if has_weak { GUARDED_MASKS } else { MASKS });
                 out.number(bricks.len() as u64);
                 let mut last = 0;
                 for brick in bricks {
                     out.brick(brick.brick, &mut last);
                     out.mask(&brick.hits);
                     out.mask(&brick.misses);
+                    if has_weak {
+                        out.mask(&brick.weak);
+                    }
                     out.number(brick.intensities.len() as u64);
                     brick.intensities.iter().for_each(|intensity| out.float(*intensity));
                 }
@@ -198,7 +204,9 @@ impl<R: BufRead> Unpacker<R> {
             return Ok(None);
         }
         Ok(Some(match self.byte()? {
-            MASKS => TileUpdates::Masks(self.bricks(Self::brick_update)?),
+            kind @ (MASKS | GUARDED_MASKS) => TileUpdates::Masks(
+                self.bricks(|input, brick| input.brick_update(brick, kind == GUARDED_MASKS))?,
+            ),
             RUNS => TileUpdates::Runs(self.tile_runs()?),
             ORDERED => {
                 let voxels = self.many(|input| Ok(u32::from_le_bytes(input.take()?)))?;
@@ -223,9 +231,10 @@ impl<R: BufRead> Unpacker<R> {
         })
     }
 
-    fn brick_update(&mut self, brick: BrickCode) -> io::Result<BrickUpdate> {
+    fn brick_update(&mut self, brick: BrickCode, has_weak: bool) -> io::Result<BrickUpdate> {
         let (hits, misses) = (self.mask()?, self.mask()?);
-        Ok(BrickUpdate { brick, hits, misses, intensities: self.many(Self::float)?.into() })
+        let weak = if has_weak { self.mask()? } else { [0; 8] };
+        Ok(BrickUpdate { brick, hits, misses, weak, intensities: self.many(Self::float)?.into() })
     }
 
     /// Reads all as runs, including the misses after the last run of a voxel.
@@ -330,10 +339,12 @@ mod tests {
     }
 
     fn masks() -> impl Strategy<Value = TileUpdates> {
-        let brick = (0..1_u64 << 39, mask(), mask(), any::<bool>()).prop_map(|(code, hits, misses, has)| {
+        let brick = (0..1_u64 << 39, mask(), mask(), mask(), any::<bool>());
+        let brick = brick.prop_map(|(code, hits, misses, weak, has)| {
             let count: u32 = hits.iter().map(|word| word.count_ones()).sum();
             let intensities = (0..if has { count } else { 0 }).map(|k| k as f32 * 0.5).collect();
-            BrickUpdate { brick: BrickCode(code), hits, misses, intensities }
+            let weak = std::array::from_fn(|word| misses[word] & weak[word]);
+            BrickUpdate { brick: BrickCode(code), hits, misses, weak, intensities }
         });
         prop::collection::vec(brick, 0..6).prop_map(TileUpdates::Masks)
     }

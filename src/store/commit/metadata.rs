@@ -1,6 +1,6 @@
 use super::commits::Commits;
 use super::input_record::InputRecord;
-use crate::config::{RayConfig, Storage};
+use crate::config::{Clearing, RayConfig, Storage};
 use crate::error::FormatError;
 use crate::sensor::SensorModel;
 use crate::space::TileIndex;
@@ -86,6 +86,9 @@ pub struct MapParameters {
     pub sensor_model: SensorModel,
     /// Probability from which a voxel counts as occupied.
     pub occupancy_threshold: f64,
+    /// Rule for the voxels that rays pass; `None` for OctoMap's.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub clearing: Option<Clearing>,
 }
 
 impl MapParameters {
@@ -160,6 +163,7 @@ impl Metadata {
             tile_size: self.tile_size_m,
             sensor_model: ext.sensor_model,
             occupancy_threshold: ext.occupancy_threshold,
+            clearing: ext.rays.clearing,
         })
     }
 

@@ -11,6 +11,8 @@ use crate::space::{BrickMask, places};
 pub(crate) struct Rest<'a> {
     hits: BrickMask,
     misses: BrickMask,
+    /// Misses that do not change observed voxels.
+    weak: BrickMask,
     /// Intensities of the remaining hits, in order; empty for sensor models that need none.
     intensities: &'a [f32],
 }
@@ -18,16 +20,17 @@ pub(crate) struct Rest<'a> {
 impl<'a> Rest<'a> {
     pub(crate) fn of(update: &'a BrickUpdate) -> Self {
         let misses = std::array::from_fn(|word| update.misses[word] & !update.hits[word]);
-        Self { hits: update.hits, misses, intensities: &update.intensities }
+        Self { hits: update.hits, misses, weak: update.weak, intensities: &update.intensities }
     }
 
     pub(crate) fn of_voxel(place: usize, observation: &'a Observation) -> Self {
         let mut mask = [0; 8];
         mask[place / 64] = 1 << (place % 64);
         match observation {
-            Observation::Miss => Self { hits: [0; 8], misses: mask, intensities: &[] },
+            Observation::Miss => Self { hits: [0; 8], misses: mask, weak: [0; 8], intensities: &[] },
             Observation::Hit(intensity) => {
-                Self { hits: mask, misses: [0; 8], intensities: std::slice::from_ref(intensity) }
+                let intensities = std::slice::from_ref(intensity);
+                Self { hits: mask, misses: [0; 8], weak: [0; 8], intensities }
             }
         }
     }
@@ -42,6 +45,9 @@ impl Brick {
     /// Applies an update. Returns the number of voxels observed for the first time. If the palette is full, the
     /// remainder is left in `rest`; the caller frees states, or makes the brick plain, and calls this again.
     pub(crate) fn update(&mut self, rest: &mut Rest<'_>, palette: &mut Palette) -> (usize, Result<(), Full>) {
+        for word in 0..8 {
+            rest.misses[word] &= !(rest.weak[word] & self.observed[word]);
+        }
         // Not by comparison, which would be a function call.
         let has_hits = rest.hits.iter().fold(0, |all, word| all | word) != 0;
         self.summary.note_change(if has_hits { f32::INFINITY } else { palette.max_after_miss() });

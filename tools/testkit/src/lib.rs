@@ -14,6 +14,8 @@ pub mod memory_folder;
 #[allow(missing_docs)]
 pub mod random_scans;
 #[allow(missing_docs)]
+pub mod reference_clearing;
+#[allow(missing_docs)]
 pub mod reference_local;
 #[allow(missing_docs)]
 pub mod reference_map;

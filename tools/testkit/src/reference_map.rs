@@ -1,3 +1,4 @@
+use crate::reference_clearing::ScanMarks;
 use std::collections::BTreeMap;
 use voxtile::mapper::MapView;
 use voxtile::scan::{PointBatch, Scan};
@@ -37,7 +38,22 @@ impl ReferenceMap {
                 }
             }
         }
-        once.into_iter().for_each(|(voxel, seen)| self.update(voxel, seen));
+        let of = |wanted: fn(&Observation) -> bool| {
+            once.iter().filter(|(_, seen)| wanted(seen)).map(|(voxel, _)| *voxel).collect()
+        };
+        let guard = self.config.rays.clearing().guard();
+        let marks = self.config.grid.voxel_of(scan.origin).map(|origin| ScanMarks {
+            hit: of(|seen| *seen != Miss),
+            missed: of(|seen| *seen == Miss),
+            origin,
+        });
+        for (voxel, seen) in once {
+            let is_full = |guard| marks.as_ref().is_some_and(|marks| marks.is_full(voxel, guard));
+            let is_weak = seen == Miss && guard.is_some_and(|guard| !is_full(guard));
+            if !(is_weak && self.voxels.contains_key(&voxel)) {
+                self.update(voxel, seen);
+            }
+        }
     }
 
     pub fn batch_update(&mut self, batch: &PointBatch<'_>) {

@@ -2,7 +2,7 @@ use super::{ReadArgs, help};
 use bytesize::ByteSize;
 use clap::{Args, ValueEnum};
 use std::path::PathBuf;
-use voxtile::Storage;
+use voxtile::{Clearing, Storage};
 use voxtile_pipeline::{FlushEvery, WhenBehind};
 
 #[derive(Debug, Args)]
@@ -51,6 +51,9 @@ pub struct BuildArgs {
     /// Number of updates of a voxel per scan [default: per-scan; with --resume, the earlier value]
     #[arg(long, value_name = "MODE")]
     pub insert: Option<InsertName>,
+    /// Which misses of a scan change a voxel, for a new map [default: octomap, or the map's]
+    #[arg(long, value_name = "RULE")]
+    pub clearing: Option<ClearingName>,
     /// Keep the scans in the map, compressed to about 10 bytes per point, for remap, remove-scans and remove-points. A
     /// map that keeps scans continues to do so
     #[arg(long)]
@@ -180,6 +183,23 @@ pub enum ModelName {
     LogOdds,
     /// Intensity-weighted log-odds, for sonar, radar and lidar intensity
     Iwlo,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub enum ClearingName {
+    /// All, as in OctoMap. Rays that graze surfaces erase some of their voxels
+    Octomap,
+    /// All but those near surfaces, which only make unknown voxels free. Keeps roads, walls and poles
+    Guarded,
+}
+
+impl From<ClearingName> for Clearing {
+    fn from(name: ClearingName) -> Self {
+        match name {
+            ClearingName::Octomap => Self::Octomap,
+            ClearingName::Guarded => Self::guarded(),
+        }
+    }
 }
 
 #[derive(Clone, Copy, Debug, ValueEnum)]

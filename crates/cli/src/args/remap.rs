@@ -1,4 +1,4 @@
-use super::{InsertName, ModelName, StorageName, help};
+use super::{ClearingName, InsertName, ModelName, StorageName, help};
 use bytesize::ByteSize;
 use clap::Args;
 use std::path::PathBuf;
@@ -63,6 +63,9 @@ pub struct RemapArgs {
     /// With -o: number of updates of a voxel per scan [default: as each scan was mapped]
     #[arg(long, value_name = "MODE", requires = "output")]
     pub insert: Option<InsertName>,
+    /// With -o: which misses of a scan change a voxel [default: the map's]
+    #[arg(long, value_name = "RULE", requires = "output")]
+    pub clearing: Option<ClearingName>,
     /// With -o: sensor model that turns observations into log-odds [default: the map's]
     #[arg(long, value_name = "MODEL", requires = "output")]
     pub sensor_model: Option<ModelName>,
