@@ -17,6 +17,7 @@ list() {
     echo "  endurance  memory, cost of a scan, speed in little memory, over distance: docs/measurements/endurance.md"
     echo "  octocache  the questions of the OctoCache paper: docs/measurements/octocache.md"
     echo "  peers      speed, memory and exactness compared with OctoMap: a table on standard output"
+    echo "  static     surfaces kept and movers removed by both rules of clearing: docs/measurements/clearing.md"
     echo "  versions   speed compared with an earlier version (--before COMMIT): docs/measurements/versions.md"
 }
 
@@ -43,6 +44,8 @@ peers() {
     octomap_contenders "$@"
     run peers "${contenders[@]}" --octomap-version "$version" "$@"
 }
+
+static() { tools/static_map/run.sh "$@"; }
 
 # Builds the programs of both versions, the earlier one from its own checkout.
 versions() {
@@ -73,7 +76,7 @@ name=${1:-}
 shift || true
 case $name in
 "") list ;;
-endurance | octocache | peers | versions) "$name" "$@" ;;
+endurance | octocache | peers | static | versions) "$name" "$@" ;;
 all)
     failed=()
     for name in endurance octocache peers; do

@@ -174,8 +174,8 @@ impl Map {
     ///
     /// Lengths are in metres. `memory` bounds all memory that grows with the map: bytes, or a text such as "512MiB"
     /// (the default). `insert_mode` is "per-scan" or "per-ray", `clearing` "octomap" or "guarded",
-    /// `sensor_model` "log-odds" or "iwlo", `storage` "octomap" or "compact". `probabilities` of the log-odds model are those of a hit and a miss, then the minimum
-    /// and the maximum.
+    /// `sensor_model` "log-odds" or "iwlo", `storage` "octomap" or "compact". `probabilities` of the log-odds model are
+    /// those of a hit and a miss, then the minimum and the maximum.
     #[staticmethod]
     #[pyo3(signature = (path, resolution=0.1, *, tile_size=10.0, min_range=0.0, max_range=None, insert_mode="per-scan",
         clearing="octomap", sensor_model="log-odds", probabilities=None, occupancy_threshold=0.5, storage="octomap", memory=None, keep_scans=false))]

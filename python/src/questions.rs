@@ -99,7 +99,7 @@ pub fn occupied(map: &View<'_>, region: Option<&Aabb>, least: Option<f64>) -> Re
     Ok((centers, probabilities))
 }
 
-/// Returns the box of a region in voxels, and a value for each of them, the last axis first.
+/// Returns the box of a region in voxels, and a value per voxel in row-major order: z varies fastest.
 pub fn dense<T: Clone>(
     map: &View<'_>,
     region: &Aabb,

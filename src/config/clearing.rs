@@ -19,8 +19,8 @@ pub enum Clearing {
 /// - the voxel and its six neighbors are missed, and none of its 26 neighbors is hit;
 /// - the cell of 2 x 2 x 2 voxels that contains it and the six adjacent cells are clear, or the same holds for cells of
 ///   4 x 4 x 4 voxels; a cell is clear if at least one of its voxels is missed and none is hit;
-/// - the cell of 2 x 2 x 2 voxels is clear, and behind it, seen from the sensor, there is a hit cell within
-///   `approach_voxels`, at a distance of at least 4 voxels.
+/// - the cell of 2 x 2 x 2 voxels is clear, none of the 26 cells around it has a hit, and behind it, seen from the
+///   sensor, there is a cell with a hit at a distance of 4 voxels to `approach_voxels`.
 ///
 /// "Hit" and "missed" refer to the same scan; a missed voxel is passed by a ray and not hit. Cells are aligned to even
 /// voxel indices, and to multiples of 4. Distances are along the axis on which the cell is farthest from the sensor.

@@ -131,6 +131,10 @@ fn settings(tile_size_m: f64) -> Vec<Setting> {
         tiles: None,
     };
     let mut settings: Vec<Setting> = modes.map(setting).into();
+    // With little memory each tile gets all marks near it, so tiny tiles would take minutes.
+    if tile_size_m < 1.0 {
+        return settings;
+    }
     let mut guarded = setting((InsertMode::PerScan, UpdateOrder::OfVoxels));
     guarded.rays.clearing = Some(Clearing::Guarded(Guard::new(8).unwrap()));
     settings.push(guarded);

@@ -3,6 +3,7 @@
 /// Scans as borrowed slices, in single precision, in either frame, with poses of every form.
 mod borrowed_scans;
 /// Conversion between storages.
+mod clearing;
 mod convert;
 /// Damage to every byte of every file of a map: found and repaired.
 mod corruption;

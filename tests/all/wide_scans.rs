@@ -6,8 +6,8 @@ use testkit::memory_folder::memory_folder;
 use testkit::random_scans::{Random, random_scan};
 use voxtile::sensor::{Iwlo, SensorModel};
 use voxtile::{
-    Clearing, Guard, InMemoryMapper, InsertMode, MapConfig, MapPath, MapQueries, MapReader, MapView, Mapper,
-    MemoryLimit, OutOfCoreTileMapper, Queries, Scan, Storage,
+    InMemoryMapper, InsertMode, MapConfig, MapPath, MapQueries, MapReader, MapView, Mapper, MemoryLimit,
+    OutOfCoreTileMapper, Queries, Scan, Storage,
 };
 
 /// Scans from scattered masts: long rays through many tiles.
@@ -27,8 +27,7 @@ fn configs() -> impl Iterator<Item = MapConfig> {
     let config = MapConfig::new(0.25, 4.0).unwrap();
     let iwlo = config.clone().with_sensor_model(SensorModel::Iwlo(Iwlo::default()));
     let every_ray = config.clone().with_insert_mode(InsertMode::PerRay);
-    let guarded = config.clone().with_clearing(Clearing::Guarded(Guard::default()));
-    [config, iwlo, every_ray, guarded].into_iter()
+    [config, iwlo, every_ray].into_iter()
 }
 
 #[test]

@@ -45,7 +45,7 @@ pub struct Cli {
     /// Maximum number of worker threads; the result is the same for any number [default: one per core]
     #[arg(long, global = true, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     pub threads: Option<u16>,
-    /// Log flushes and other steps; -vv also logs each tile read or written. RUST_LOG selects by module
+    /// Log flushes and other steps; -vv also logs each tile read or written. RUST_LOG sets the level by module
     #[arg(short, long, global = true, action = clap::ArgAction::Count)]
     pub verbose: u8,
     /// Print only errors, results and JSON: no warnings, summaries or progress bars

@@ -11,7 +11,7 @@ use voxtile::operations::{KeptBytes, kept_bytes};
 use voxtile::sensor::SensorModel;
 use voxtile::space::{Aabb, Grid, TileBox};
 use voxtile::store::{Bounds, InputRecord, MapPath};
-use voxtile::{MapQueries, Result, Storage};
+use voxtile::{Clearing, MapQueries, Result, Storage};
 use voxtile_pipeline::read_map;
 
 /// Maximum number of inputs in text; JSON lists all.
@@ -26,6 +26,8 @@ pub struct Info {
     pub tile_size_m: f64,
     pub sensor_model: SensorModel,
     pub occupancy_threshold: f64,
+    /// Rule for the voxels that rays pass.
+    pub clearing: Clearing,
     pub storage: Storage,
     pub scan_number: u64,
     pub flush_number: u64,
@@ -82,6 +84,7 @@ impl Info {
             tile_size_m,
             sensor_model: config.sensor_model,
             occupancy_threshold: config.occupancy_threshold,
+            clearing: config.rays.clearing(),
             storage: config.storage,
             scan_number: reader.scan_number(),
             flush_number: reader.flush_number(),
@@ -112,6 +115,9 @@ impl Info {
         writeln!(out, "resolution   {} m, tiles of {} m", self.resolution_m, self.tile_size_m)?;
         let model = self.sensor_model.name();
         writeln!(out, "model        {model}, occupied from probability {}", self.occupancy_threshold)?;
+        if self.clearing != Clearing::Octomap {
+            writeln!(out, "clearing     {}", self.clearing)?;
+        }
         if let Some(tiles) = self.region_tiles
             && let Ok(grid) = Grid::new(self.resolution_m, self.tile_size_m)
         {

@@ -68,7 +68,7 @@ impl ScanSource for KeptSource {
         let Some(scan) = self.scans.next().transpose()? else { return Ok(None) };
         let Some(own) = scan.world_from_sensor() else {
             let reason = format!(
-                "scan {} has its points in the world frame and no pose; `voxtile remap -o` maps it all the same",
+                "scan {} has its points in the world frame and no pose; use `voxtile remap -o`, which needs none",
                 scan.number()
             );
             return Err(Error::argument(self.path.display().to_string(), reason));

@@ -43,6 +43,12 @@ fn between<const AXIS: usize>(block: u64, lower: u64, upper: u64) -> u64 {
     above::<AXIS>(block, lower) & below::<AXIS>(block, upper)
 }
 
+/// Returns the items of a block that are in the set or have a neighbor along an axis that is.
+#[inline]
+pub(super) fn dilated_block<const AXIS: usize>(block: u64, lower: u64, upper: u64) -> u64 {
+    block | above::<AXIS>(block, lower) | below::<AXIS>(block, upper)
+}
+
 /// Returns the items of a block whose six neighbors are in the set, and which are in it themselves. `around` are the
 /// blocks below and above along each axis.
 #[inline]
@@ -91,7 +97,7 @@ pub(super) fn dilated<const AXIS: usize>(
         let other = word ^ 1 << AXIS;
         let (lower, upper) =
             if word >> AXIS & 1 == 1 { (brick[other], upper[other]) } else { (lower[other], brick[other]) };
-        brick[word] | above::<AXIS>(brick[word], lower) | below::<AXIS>(brick[word], upper)
+        dilated_block::<AXIS>(brick[word], lower, upper)
     })
 }
 

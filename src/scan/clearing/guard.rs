@@ -1,5 +1,5 @@
 use super::cells::{
-    between_voxels, block_of_octets, cells_of, dilated, eroded_block, eroded_octet, octets_of,
+    between_voxels, block_of_octets, cells_of, dilated, dilated_block, eroded_block, eroded_octet, octets_of,
 };
 use super::marks::Marks;
 use crate::config::Guard;
@@ -15,20 +15,42 @@ const CELLS_EDGE: i32 = BRICK_EDGE / CELL_EDGE;
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct BrickCells {
     /// Cells with a miss and without a hit.
-    pub(crate) clear: u64,
+    clear: u64,
     /// Cells with a hit.
-    pub(crate) hit: u64,
+    hit: u64,
+    /// Octants of the brick with a miss and without a hit.
+    clear_octants: u8,
 }
 
 impl BrickCells {
     pub(crate) fn of(brick: &MarkedBrick) -> Self {
+        if is_empty(&brick.hits) {
+            let clear = cells_of(&brick.passed);
+            return Self { clear, hit: 0, clear_octants: octets_of(clear) };
+        }
         let hit = cells_of(&brick.hits);
-        Self { clear: cells_of(&brick.misses()) & !hit, hit }
+        let clear = cells_of(&brick.misses()) & !hit;
+        Self { clear, hit, clear_octants: octets_of(clear) & !octets_of(hit) }
     }
 
-    /// Octants of the brick with a miss and without a hit.
-    fn clear_octants(self) -> u8 {
-        octets_of(self.clear) & !octets_of(self.hit)
+    /// Returns the cells that are clear with the six cells around them, as cells of 2 or of 4 voxels. `around` returns
+    /// the bricks below and above along each axis.
+    fn eroded(self, around: impl FnOnce() -> [[Self; 2]; 3]) -> u64 {
+        let Self { clear, clear_octants, .. } = self;
+        // Most bricks with few rays need no look at their neighbors.
+        let within_brick = eroded_block(clear, &[[u64::MAX; 2]; 3])
+            | u64::from(eroded_octet(clear_octants, &[[u8::MAX; 2]; 3]));
+        if within_brick == 0 {
+            return 0;
+        }
+        let around = around();
+        let octants = around.map(|pair| pair.map(|cells| cells.clear_octants));
+        // Close to the sensor most bricks are like this.
+        if octants.as_flattened().iter().fold(clear_octants, |all, octants| all & octants) == u8::MAX {
+            return u64::MAX;
+        }
+        eroded_block(clear, &around.map(|pair| pair.map(|cells| cells.clear)))
+            | block_of_octets(eroded_octet(clear_octants, &octants))
     }
 }
 
@@ -54,7 +76,7 @@ impl Clearance {
         if is_empty(&weak) {
             return weak;
         }
-        let open = open_voxels(index, &misses, marks);
+        let open = open_voxels(index, &misses, weak, marks);
         (0..8).for_each(|word| weak[word] &= !open[word]);
         weak
     }
@@ -65,18 +87,19 @@ impl Clearance {
         if cells.clear == 0 {
             return 0;
         }
-        let around = neighbors(index, |brick| marks.cells(brick));
-        let octants = around.map(|pair| pair.map(BrickCells::clear_octants));
-        let full = eroded_block(cells.clear, &around.map(|pair| pair.map(|cells| cells.clear)))
-            | block_of_octets(eroded_octet(cells.clear_octants(), &octants));
+        let full = cells.eroded(|| neighbors(index, |brick| marks.cells(brick)));
         let rest = cells.clear & !full;
         if rest == 0 || !marks.may_be_near_hits(index) {
             return full;
         }
-        full | self.approached_cells(index, rest, marks)
+        let approached = self.approached_cells(index, rest, marks);
+        if approached == 0 {
+            return full;
+        }
+        full | approached & !near_block(index, |brick| marks.cells(brick).hit)
     }
 
-    /// Returns those of the given cells behind which, seen from the sensor, a cell is hit.
+    /// Returns those of the given cells behind which, seen from the sensor, there is a hit cell.
     fn approached_cells(&self, index: VoxelIndex, cells: u64, marks: &impl Marks) -> u64 {
         let steps = 2..=i64::from(self.guard.approach_cells());
         let is_approached = |place: usize| {
@@ -100,26 +123,31 @@ impl Clearance {
             std::array::from_fn(|k| i64::from(cell[k]) * 4 + 2 - (2 * i64::from(self.origin[k]) + 1));
         let largest = from_sensor.iter().map(|distance| distance.abs()).max().unwrap_or(1);
         std::array::from_fn(|k| {
-            let cells = (2 * step * from_sensor[k].abs() + largest) / (2 * largest);
-            cell[k] + (cells * from_sensor[k].signum()) as i32
+            // `step * distance / largest`, rounded to the nearest integer. Comparisons are faster than a division.
+            let twice = 2 * step * from_sensor[k].abs();
+            let cells: i32 = (1..=step).map(|cells| i32::from((2 * cells - 1) * largest <= twice)).sum();
+            if from_sensor[k] < 0 { cell[k] - cells } else { cell[k] + cells }
         })
     }
 }
 
-/// Returns the misses whose six neighbors are missed, too, and whose 26 neighbors are not hit.
-fn open_voxels(index: VoxelIndex, misses: &BrickMask, marks: &impl Marks) -> BrickMask {
-    let mut open = *misses;
-    for axis in 0..3 {
-        let [lower, upper] = [-1, 1].map(|step| marks.misses(moved(index, axis, step)));
+/// Returns those of some misses whose six neighbors are missed, too, and whose 26 neighbors are not hit.
+fn open_voxels(index: VoxelIndex, misses: &BrickMask, mut open: BrickMask, marks: &impl Marks) -> BrickMask {
+    let mut keep_between = |axis: usize, [lower, upper]: &[BrickMask; 2]| {
         let between = match axis {
-            0 => between_voxels::<0>(misses, &lower, &upper),
-            1 => between_voxels::<1>(misses, &lower, &upper),
-            _ => between_voxels::<2>(misses, &lower, &upper),
+            0 => between_voxels::<0>(misses, lower, upper),
+            1 => between_voxels::<1>(misses, lower, upper),
+            _ => between_voxels::<2>(misses, lower, upper),
         };
         (0..8).for_each(|word| open[word] &= between[word]);
-        if is_empty(&open) {
-            return open;
-        }
+        is_empty(&open)
+    };
+    // Most bricks with few rays need no look at their neighbors.
+    const ALL: [BrickMask; 2] = [[u64::MAX; 8]; 2];
+    let is_closed = (0..3).any(|axis| keep_between(axis, &ALL))
+        || (0..3).any(|axis| keep_between(axis, &[-1, 1].map(|step| marks.misses(moved(index, axis, step)))));
+    if is_closed {
+        return [0; 8];
     }
     if marks.may_be_near_hits(index) {
         let near_hits = near_set(index, |brick| marks.hits(brick));
@@ -141,6 +169,20 @@ pub(crate) fn near_set(index: VoxelIndex, of: impl Fn(VoxelIndex) -> BrickMask) 
     };
     let [lower, middle, upper] = [-1, 0, 1].map(along_y);
     dilated::<2>(&middle, &lower, &upper)
+}
+
+/// As [`near_set`], for blocks.
+fn near_block(index: VoxelIndex, of: impl Fn(VoxelIndex) -> u64) -> u64 {
+    let along_x = |y: i32, z: i32| {
+        let [lower, middle, upper] = [-1, 0, 1].map(|x| of([index[0] + x, index[1] + y, index[2] + z]));
+        dilated_block::<0>(middle, lower, upper)
+    };
+    let along_y = |z: i32| {
+        let [lower, middle, upper] = [-1, 0, 1].map(|y| along_x(y, z));
+        dilated_block::<1>(middle, lower, upper)
+    };
+    let [lower, middle, upper] = [-1, 0, 1].map(along_y);
+    dilated_block::<2>(middle, lower, upper)
 }
 
 /// Returns a value for the bricks below and above along each axis.

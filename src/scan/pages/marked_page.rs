@@ -256,8 +256,23 @@ impl MarkedPage {
     /// Masks of a brick: voxels in which rays end, and voxels that rays pass, including those that are also hit.
     #[inline]
     pub(crate) fn brick(&self, place: usize) -> (BrickMask, BrickMask) {
-        let hits = self.hits.as_ref().and_then(|hits| hits.brick_at(place));
-        (hits.copied().unwrap_or_default(), self.passed.brick(place))
+        (self.hits_at(place), self.passed.brick(place))
+    }
+
+    /// Hits of the brick at a position.
+    #[inline]
+    pub(crate) fn hits_at(&self, place: usize) -> BrickMask {
+        self.hits.as_ref().and_then(|hits| hits.brick_at(place)).copied().unwrap_or_default()
+    }
+
+    /// Voxels of the brick at a position that are passed and not hit.
+    #[inline]
+    pub(crate) fn misses_at(&self, place: usize) -> BrickMask {
+        let mut misses = self.passed.brick(place);
+        if let Some(hits) = self.hits.as_ref().and_then(|hits| hits.brick_at(place)) {
+            (0..8).for_each(|word| misses[word] &= !hits[word]);
+        }
+        misses
     }
 
     /// The bricks with marks. `page` is the index of the page: the indices of its voxels divided by 64.

@@ -61,34 +61,26 @@ impl<'a> PageMarks<'a> {
     }
 
     /// The page of a brick, and the brick's position in it.
-    #[inline]
+    #[inline(always)]
     fn find(&self, brick: VoxelIndex) -> Option<(usize, usize)> {
         let page = self.pages.find(brick.map(|k| k.div_euclid(BRICK_EDGE)))?;
         Some((page, place_of_voxel(brick)))
-    }
-
-    fn marked(&self, brick: VoxelIndex) -> MarkedBrick {
-        match self.find(brick) {
-            Some((page, place)) => {
-                let (hits, passed) = self.pages.pages()[page].brick(place);
-                MarkedBrick { index: brick, hits, passed }
-            }
-            None => self.far.get(brick).copied().unwrap_or(MarkedBrick {
-                index: brick,
-                hits: [0; 8],
-                passed: [0; 8],
-            }),
-        }
     }
 }
 
 impl Marks for PageMarks<'_> {
     fn hits(&self, brick: VoxelIndex) -> BrickMask {
-        self.marked(brick).hits
+        match self.find(brick) {
+            Some((page, place)) => self.pages.pages()[page].hits_at(place),
+            None => self.far.get(brick).map_or([0; 8], |marked| marked.hits),
+        }
     }
 
     fn misses(&self, brick: VoxelIndex) -> BrickMask {
-        self.marked(brick).misses()
+        match self.find(brick) {
+            Some((page, place)) => self.pages.pages()[page].misses_at(place),
+            None => self.far.get(brick).map_or([0; 8], MarkedBrick::misses),
+        }
     }
 
     fn cells(&self, brick: VoxelIndex) -> BrickCells {

@@ -243,8 +243,8 @@ impl<'a> SlabRay<'a> {
         Ok(())
     }
 
-    /// Passes the voxels of a slab, from `[a, b, c]` on, in any page. Returns the voxel through which the ray enters
-    /// the next slab; `None`, with nothing passed, if that is uncertain.
+    /// Marks the voxels of a slab as passed, beginning with `[a, b, c]`, in any page. Returns the voxel through which
+    /// the ray enters the next slab. If rounding makes that voxel uncertain, it marks nothing and returns `None`.
     #[inline]
     fn pass_slab<const A: usize, const B: usize, const C: usize, F: Footprint>(
         pages: &mut PageMap<F>,
@@ -264,8 +264,8 @@ impl<'a> SlabRay<'a> {
         Some(exit)
     }
 
-    /// Passes the voxels of a slab, from `[a, b, c]` on, by the closed form. Returns the voxel through which the ray
-    /// enters the next slab; `None`, with nothing passed, if the ray ends before.
+    /// Marks the voxels of a slab as passed, beginning with `[a, b, c]`, by the closed form. Returns the voxel through
+    /// which the ray enters the next slab. If the ray ends before, it marks nothing and returns `None`.
     #[cold]
     fn walk_slab<const A: usize, const B: usize, const C: usize, F: Footprint>(
         &self,

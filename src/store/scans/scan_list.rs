@@ -312,7 +312,7 @@ fn for_each_record(
         return Err(FormatError::at_offset(0, reason).into());
     }
     if header != HEADER {
-        // After a crash a part of the header may be missing on the disk. If records are missing, their number shows it.
+        // A crash may leave an incomplete header. The number of records shows whether records are missing, too.
         return Ok(Some(file_bytes));
     }
     let mut at = HEADER_BYTES as u64;

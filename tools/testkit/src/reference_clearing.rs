@@ -53,6 +53,7 @@ impl ScanMarks {
         let way: [i64; 3] = [0, 1, 2].map(|k| 4 * i64::from(cell[k]) + 2 - 2 * i64::from(self.origin[k]) - 1);
         let longest = way.map(i64::abs).into_iter().max().unwrap();
         self.is_clear(cell, 2)
+            && cube(sum(cell, [-1; 3]), 3).all(|near| !self.has_hit(near, 2))
             && (2..=i64::from(guard.approach_voxels) / 2).any(|step| {
                 // The quotient, rounded to the nearest integer, halves away from zero.
                 let offset = way.map(|x| {

@@ -73,8 +73,8 @@ pub struct BuildArgs {
     /// Add the scans to an existing map that has no scans of this input yet
     #[arg(long)]
     pub append: bool,
-    /// Continue an interrupted build or an input that has grown; starts the build if there is no map, or with --append.
-    /// Each scan counts exactly once, however often the command is repeated
+    /// Continue an interrupted build, or insert the new scans of an input that has grown. Without a map, start one;
+    /// with --append, start the input in an existing map. Each scan is inserted once, however often this is repeated
     #[arg(long)]
     pub resume: bool,
     /// Add the scans even if the map has scans of this input already; they count again
@@ -83,7 +83,8 @@ pub struct BuildArgs {
     /// Skip scans that cannot be read and list them, instead of failing
     #[arg(long)]
     pub skip_bad: bool,
-    /// Fail if the poses do not fit the scans, instead of a warning; compares some of the first scans with earlier ones
+    /// Fail if the poses do not fit the scans, which is otherwise a warning. Some of the first scans are compared with
+    /// the scans before them
     #[arg(long)]
     pub strict: bool,
     /// Flush the map every N seconds while mapping continues (60s), every N scans with a pause (25), or only at the end

@@ -326,3 +326,29 @@ fn unordered_poses_are_not_matched_by_line() {
         assert!(!message.contains("is skipped"), "{message}");
     }
 }
+
+#[test]
+fn a_map_has_one_rule_of_clearing() {
+    let kept = Kept::new();
+    let (guarded, again) = (kept.path("guarded"), kept.path("again"));
+    let build = ["build", text(&kept.scans), "-o", &guarded, "--keep-scans", "--tile-size", "1"];
+    output(&[&build[..], &["--clearing", "guarded"]].concat());
+    assert_eq!(json(&["info", &guarded, "--json"])["clearing"]["guarded"]["approach_voxels"], 4);
+    assert_eq!(json(&["info", &kept.map, "--json"])["clearing"], "octomap");
+    assert!(output(&["info", &guarded]).contains("clearing     guarded"));
+    assert_ne!(digest(&guarded), digest(&kept.map));
+
+    // Without the option the map's rule is used; another one is an error.
+    let more = ["build", text(&kept.scans), "-o", &guarded, "--append", "--again"];
+    let refused = fails(&[&more[..], &["--clearing", "octomap"]].concat(), 2);
+    assert!(refused.contains("rule of clearing"), "{refused}");
+    output(&more);
+    let per_ray = ["build", text(&kept.scans), "-o", &again, "--clearing", "guarded", "--insert", "per-ray"];
+    assert!(fails(&per_ray, 2).contains("per-scan"));
+
+    // A map of the other rule, from the kept scans.
+    output(&["remap", &kept.map, "-o", &again, "--clearing", "guarded"]);
+    let fresh = kept.path("fresh");
+    output(&["build", text(&kept.scans), "-o", &fresh, "--tile-size", "1", "--clearing", "guarded"]);
+    assert_eq!(digest(&again), digest(&fresh));
+}

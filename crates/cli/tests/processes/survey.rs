@@ -20,7 +20,7 @@ pub const RESOLUTION_M: f64 = 0.5;
 const MAX_RANGE_M: f64 = 20.0;
 
 impl Scans {
-    /// Writes `count` scans of a drive through a synthetic city; builds map them `rounds` times.
+    /// Writes `count` scans of a drive through a synthetic city. Each build inserts all of them `rounds` times.
     pub fn new(count: usize, rounds: usize) -> Self {
         let around = TempDir::new().unwrap();
         let folder = TempDir::new_in(around.path()).unwrap();

@@ -24,7 +24,7 @@ impl Samples {
         self.memory.insert(stamp_ns, pose);
     }
 
-    /// Returns the number of samples, without those being sorted.
+    /// Returns the number of samples that are in order; `waiting` is not counted.
     pub(super) fn len(&self) -> usize {
         self.memory.len() + self.filed.len()
     }

@@ -28,7 +28,7 @@ pub(super) enum Reading {
     NotCamera,
     Millimetres,
     Centimetres,
-    /// All scans at the same place, for comparison, because flat ground looks alike everywhere.
+    /// All scans at the same place. If they fit there as well, the ground is too flat to distinguish poses.
     Still,
     /// The points are in the world frame.
     WorldFrame,

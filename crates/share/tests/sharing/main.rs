@@ -2,7 +2,7 @@
 
 /// Encoding of packets, and hostile bytes.
 mod codec;
-/// Memory filled by hostile robots, counted and measured.
+/// Memory limits: memory that a receiver counts, and memory measured while robots send as much as they can.
 mod full_memory;
 /// Merging of layers, unions, watches.
 mod layers;

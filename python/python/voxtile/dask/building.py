@@ -324,7 +324,7 @@ def _plan(client: Any, source: str, settings: dict[str, Any]) -> tuple[list[_Sca
     """
     reading = {name: value for name, value in settings.items() if name in ReadOptions.__annotations__}
     reach = (settings["max_range"], settings.get("clear_no_return"))
-    # Counting the scans of other formats without a stored number would read them all; a single task does that too.
+    # Other formats without a stored number would have to be read completely to count their scans, so they get one task.
     is_stream = source.lower().endswith(".scans")
     scans = files.count_scans(source, **reading) if is_stream else operator.length_hint(files.scans(source, **reading))
     workers = max(sum(client.nthreads().values()), 1)
