@@ -188,6 +188,8 @@ impl PerScanCollector {
                 }
             }
         });
+        // A stray ray must not occupy memory permanently.
+        drop(self.far.take());
         let tiles: Vec<_> = tiles
             .into_iter()
             .map(|(tile, bricks)| {

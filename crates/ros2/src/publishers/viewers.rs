@@ -3,7 +3,7 @@ use crate::live_map::MapVersion;
 use std::time::{Duration, Instant};
 use voxtile::VoxelIndex;
 
-/// State of the subscribers that accumulate changes: what was sent, and what must be sent next.
+/// The changes that subscribers have received, and those to send next.
 #[derive(Debug)]
 pub struct Viewers {
     count: usize,
