@@ -4,6 +4,7 @@ use std::path::Path;
 use testkit::faulty_disk::{Fault, FaultyDisk};
 use testkit::random_scans::Random;
 use testkit::reference_map::{ReferenceMap, voxels_of};
+use voxtile::integrity::repair;
 use voxtile::operations::{Prefer, Replay, merge, rebuild, remove_points};
 use voxtile::scan::Stop;
 use voxtile::{
@@ -101,22 +102,25 @@ fn removed_points_change_neighboring_tiles() {
     // voxel before the border at y = 8.
     let config = guarded(1.0, 8.0).with_kept_scans(true);
     let origin = [0.5, 4.5, 4.5];
-    let wall = (0..14).flat_map(|y| (0..8).map(move |z| [30.5, f64::from(y) + 0.5, f64::from(z) + 0.5]));
+    let wall = (0..30).flat_map(|y| (0..8).map(move |z| [30.5, f64::from(y) + 0.5, f64::from(z) + 0.5]));
     let post = [12.5, 7.5, 4.5];
     let points: Vec<_> = wall.chain([post]).collect();
     let first = Scan { origin, points: vec![[13.5, 8.5, 4.5], [12.5, 9.5, 4.5]], intensities: None };
+    // Scans elsewhere: a change of most updates would replay all tiles.
+    let moved = |point: &[f64; 3]| [point[0], point[1] + 800.0, point[2]];
+    let far = Scan { origin: moved(&origin), points: points.iter().map(moved).collect(), intensities: None };
     let second = Scan { origin, points, intensities: None };
     let at = |disk: &FaultyDisk| MapPath::on(disk.shared(), Path::new("/map"));
     let digest = |second: &Scan| {
         let mut mapper = InMemoryMapper::new(config.clone()).unwrap();
-        [&first, second].into_iter().for_each(|scan| {
+        [&first, second].into_iter().chain([&far; 9]).for_each(|scan| {
             mapper.insert_scan(scan).unwrap();
         });
         mapper.digest().unwrap()
     };
     let disk = FaultyDisk::new(Fault::None);
     let mut mapper = OutOfCoreTileMapper::create(at(&disk), config.clone()).unwrap();
-    [&first, &second].into_iter().for_each(|scan| {
+    [&first, &second].into_iter().chain([&far; 9]).for_each(|scan| {
         mapper.insert_scan(scan).unwrap();
     });
     mapper.flush().unwrap();
@@ -127,6 +131,8 @@ fn removed_points_change_neighboring_tiles() {
     let region = Aabb { min: [12.0, 7.0, 4.0], max: [13.0, 8.0, 5.0] };
     let removed = remove_points(at(&disk), &region, &Replay::default(), |_, _| ()).unwrap();
     assert_eq!(removed.points_removed, 1);
+    let counts = &removed.mapped;
+    assert!(counts.tiles_mapped < counts.tiles, "{} of {} tiles", counts.tiles_mapped, counts.tiles);
     let without = Scan { points: second.points[..second.points.len() - 1].to_vec(), ..second.clone() };
     let after = MapReader::open(at(&disk), 0).unwrap();
     assert_eq!(after.digest().unwrap(), digest(&without));
@@ -165,6 +171,9 @@ fn a_map_keeps_its_rule() {
     assert_eq!(metadata["ext"]["rays"]["clearing"]["guarded"]["approach_voxels"], 6);
     drop(OutOfCoreTileMapper::create(at("other"), config.clone().with_clearing(Clearing::Octomap)).unwrap());
     assert!(!text("other").contains("clearing"));
+    // Programs which do not know the rule refuse the map by its version.
+    assert_eq!(metadata["version"], "1.1");
+    assert!(text("other").contains(r#""version": "1.0""#));
 
     // Rebuilt from the kept scans by the other rule.
     let reader = MapReader::open(at("map"), 0).unwrap();
@@ -178,6 +187,15 @@ fn a_map_keeps_its_rule() {
     plain.insert_scan(scan).unwrap();
     assert_eq!(MapReader::open(at("again"), 0).unwrap().digest().unwrap(), plain.digest().unwrap());
     assert!(!text("again").contains("guarded"));
+    drop(reader);
+
+    // Tiles record the rule, so a repair without the metadata restores it.
+    let map = Path::new("/map");
+    for name in ["metadata.json", "commits.log"] {
+        disk.take(&map.join(name));
+    }
+    repair(at("map"), |_| (), |_, _| ()).unwrap();
+    assert_eq!(MapReader::open(at("map"), 0).unwrap().config().rays.clearing, config.rays.clearing);
 
     // Evidence of guarded maps cannot be added.
     let maps = || ["map", "map"].map(|name| MapReader::open(at(name), 0).unwrap());

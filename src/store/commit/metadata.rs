@@ -138,6 +138,8 @@ impl ReadExtension {
 }
 
 const VERSION: &str = "1.0";
+/// Version of maps with guarded clearing. Programs which do not know the rule must not add scans to them.
+const GUARDED_VERSION: &str = "1.1";
 /// The file ends with a checksum of all bytes before it.
 const CHECKSUM_KEY: &str = "    \"crc32\": \"";
 const END: &str = "\"\n  }\n}\n";
@@ -196,14 +198,20 @@ impl Metadata {
         without_progress(self) == without_progress(other)
     }
 
+    fn version(&self) -> &'static str {
+        let clearing = self.ext.as_ref().and_then(|ext| ext.rays.clearing);
+        if clearing.is_some_and(|clearing| clearing.guard().is_some()) { GUARDED_VERSION } else { VERSION }
+    }
+
     /// Returns the text of the file. The original keys come first, in the original order. Lengths are plain decimals.
     pub fn to_text(&self) -> String {
         let Bounds { min, max } = self.bounds.unwrap_or(Bounds { min: [0; 3], max: [0; 3] });
         let bounds = format!("\"bounds\": {{\n    \"min\": {min:?},\n    \"max\": {max:?}\n  }}");
         // Rust prints the shortest decimal that reads back to the same bits, without an exponent.
         let (resolution, tile_size) = (decimal(self.resolution_m), decimal(self.tile_size_m));
+        let version = self.version();
         let head = format!(
-            "{{\n  \"version\": \"{VERSION}\",\n  \"resolution\": {resolution},\n  \"tile_size\": {tile_size},\n  {bounds}"
+            "{{\n  \"version\": \"{version}\",\n  \"resolution\": {resolution},\n  \"tile_size\": {tile_size},\n  {bounds}"
         );
         let Some(ext) = &self.ext else { return head + "\n}\n" };
         let ext = serde_json::to_string_pretty(ext).expect("plain data of strings and numbers");
@@ -218,14 +226,14 @@ impl Metadata {
     ///
     /// # Errors
     ///
-    /// Text that is not JSON of a map's metadata, a version other than 1.0, or a wrong checksum.
+    /// Text that is not JSON of a map's metadata, an unknown version, or a wrong checksum.
     pub fn from_text(text: &str) -> Result<Self, FormatError> {
         let document: Document = serde_json::from_str(text).map_err(|error| {
             FormatError::at_line(error.line() as u64, format!("not a map's metadata: {error}"))
         })?;
-        if document.version != VERSION {
-            let reason =
-                format!("version {:?} is not known; this program reads {VERSION:?}", document.version);
+        if ![VERSION, GUARDED_VERSION].contains(&document.version.as_str()) {
+            let known = format!("this program reads {VERSION:?} and {GUARDED_VERSION:?}");
+            let reason = format!("version {:?} is not known; {known}", document.version);
             return Err(FormatError::at_offset(0, reason));
         }
         // A checksum without `ext` indicates a damaged key, not a file of the original format.
