@@ -92,7 +92,7 @@ fn statistics_count_everything_with_little_memory() {
 fn tiles_out_of_range_are_written_once_with_their_updates() {
     let folder = memory_folder();
     let config = MapConfig::new(0.2, 1.6).unwrap().with_range(0.0, 20.0);
-    let scans: Vec<Scan> = Survey::tour(3, 1_000).take(cases(120, 240) as usize).collect();
+    let scans: Vec<Scan> = Survey::tour(3, 1_000).take(cases(80, 240) as usize).collect();
     let mut expected = InMemoryMapper::new(config.clone()).unwrap();
     let tight = config.with_tight_memory_bytes(2_000_000);
     let path = MapPath::on(UnsyncedDisk::shared(), folder.path().join("map"));

@@ -66,14 +66,7 @@ fn out_of_core_equals_the_naive_map_for_any_cache_and_after_flush_and_reopen() {
     for (seed, config) in configs().into_iter().enumerate() {
         let mut digests = Vec::new();
         use Storage::{Compact, OctoMap};
-        let kinds = [
-            (1, 0, OctoMap),
-            (1, 1 << 20, Compact),
-            (3, 20_000, OctoMap),
-            (3, 20_000, Compact),
-            (10_000, 0, OctoMap),
-            (10_000, 0, Compact),
-        ];
+        let kinds = [(1, 0, OctoMap), (1, 1 << 20, Compact), (3, 20_000, OctoMap), (10_000, 0, Compact)];
         for (cache_tiles, write_buffer_bytes, storage) in kinds {
             let folder = memory_folder();
             let config =

@@ -60,7 +60,9 @@ fn batches_equal_single_inserts_for_any_threads_and_memory() {
             assert_eq!(mapper.scan_number(), scans.len() as u64);
         }
         let limits = [None, Some(0), Some(400_000), Some(40 << 20), Some(1 << 30)];
-        for (threads, bytes) in [1, 2, 3].into_iter().flat_map(|threads| limits.map(|bytes| (threads, bytes)))
+        let all_limits = limits.map(|bytes| (2, bytes));
+        for (threads, bytes) in
+            [(1, Some(0)), (1, Some(400_000)), (3, Some(400_000))].into_iter().chain(all_limits)
         {
             let folder = tempfile::tempdir().unwrap();
             let path = MapPath::on(UnsyncedDisk::shared(), folder.path().join("map"));
