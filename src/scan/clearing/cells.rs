@@ -49,6 +49,25 @@ pub(super) fn dilated_block<const AXIS: usize>(block: u64, lower: u64, upper: u6
     block | above::<AXIS>(block, lower) | below::<AXIS>(block, upper)
 }
 
+/// Returns on which sides along each axis a block has items whose neighbors are in other blocks: below, above.
+#[inline]
+pub(super) fn sides_of(block: u64) -> [[bool; 2]; 3] {
+    LAYERS.map(|[lower, _, _, upper]| [block & lower != 0, block & upper != 0])
+}
+
+/// Adds the items of a block whose lower neighbor along an axis is in the set. Takes and returns the block and the block
+/// below.
+#[inline]
+pub(super) fn lower_step<const AXIS: usize>((block, lower): (u64, u64), _: i32) -> (u64, u64) {
+    (block | above::<AXIS>(block, lower), lower | above::<AXIS>(lower, 0))
+}
+
+/// As [`lower_step`], with the upper neighbor and the block above.
+#[inline]
+pub(super) fn upper_step<const AXIS: usize>((block, upper): (u64, u64), _: i32) -> (u64, u64) {
+    (block | below::<AXIS>(block, upper), upper | below::<AXIS>(upper, 0))
+}
+
 /// Returns the items of a block whose six neighbors are in the set, and which are in it themselves. `around` are the
 /// blocks below and above along each axis.
 #[inline]

@@ -3,19 +3,32 @@ use crate::scan::pages::MarkedBrick;
 use crate::space::{BrickMask, VoxelIndex};
 use rustc_hash::FxHashMap;
 
+/// Step to a brick from another one: -1, 0 or 1 along each axis.
+pub(crate) type Step = [i32; 3];
+
+/// Step of a brick to itself.
+pub(crate) const HERE: Step = [0; 3];
+
 /// Marks of a whole scan by brick. The index of a brick is that of its voxels divided by 8.
 pub(crate) trait Marks {
-    /// Hits of a brick.
-    fn hits(&self, brick: VoxelIndex) -> BrickMask;
+    /// Returns the marks of a brick and of the 26 bricks around it.
+    fn around(&self, brick: VoxelIndex) -> impl MarksAround;
+}
 
-    /// Voxels of a brick that are passed and not hit.
-    fn misses(&self, brick: VoxelIndex) -> BrickMask;
+/// Marks of a brick and of the 26 bricks around it, by the step to the brick.
+pub(crate) trait MarksAround {
+    fn hits(&self, step: Step) -> BrickMask;
 
-    /// Cells of a brick.
-    fn cells(&self, brick: VoxelIndex) -> BrickCells;
+    /// Voxels that are passed and not hit.
+    fn misses(&self, step: Step) -> BrickMask;
 
-    /// Returns whether a brick or one of its 26 neighbors may have hits.
-    fn may_be_near_hits(&self, brick: VoxelIndex) -> bool;
+    fn cells(&self, step: Step) -> BrickCells;
+
+    /// Cells with a hit.
+    fn hit_cells(&self, step: Step) -> u64;
+
+    /// Returns whether any of the 27 bricks may have hits.
+    fn may_have_hits(&self) -> bool;
 }
 
 /// Marks in a hash map, for scans whose pages are not in memory.
@@ -31,19 +44,46 @@ impl FromIterator<MarkedBrick> for BrickMarks {
 }
 
 impl Marks for BrickMarks {
-    fn hits(&self, brick: VoxelIndex) -> BrickMask {
-        self.bricks.get(&brick).map_or([0; 8], |marked| marked.hits)
+    fn around(&self, brick: VoxelIndex) -> impl MarksAround {
+        BrickMarksAround { marks: self, brick }
+    }
+}
+
+struct BrickMarksAround<'a> {
+    marks: &'a BrickMarks,
+    brick: VoxelIndex,
+}
+
+impl BrickMarksAround<'_> {
+    fn get(&self, step: Step) -> Option<&MarkedBrick> {
+        self.marks.bricks.get(&moved(self.brick, step))
+    }
+}
+
+impl MarksAround for BrickMarksAround<'_> {
+    fn hits(&self, step: Step) -> BrickMask {
+        self.get(step).map_or([0; 8], |marked| marked.hits)
     }
 
-    fn misses(&self, brick: VoxelIndex) -> BrickMask {
-        self.bricks.get(&brick).map_or([0; 8], MarkedBrick::misses)
+    fn misses(&self, step: Step) -> BrickMask {
+        self.get(step).map_or([0; 8], MarkedBrick::misses)
     }
 
-    fn cells(&self, brick: VoxelIndex) -> BrickCells {
-        self.bricks.get(&brick).map_or_else(BrickCells::default, BrickCells::of)
+    fn cells(&self, step: Step) -> BrickCells {
+        self.get(step).map_or_else(BrickCells::default, BrickCells::of)
     }
 
-    fn may_be_near_hits(&self, _: VoxelIndex) -> bool {
+    fn hit_cells(&self, step: Step) -> u64 {
+        self.cells(step).hit
+    }
+
+    fn may_have_hits(&self) -> bool {
         true
     }
+}
+
+/// Returns the index of the brick at a step from another one.
+#[inline]
+pub(crate) fn moved(brick: VoxelIndex, step: Step) -> VoxelIndex {
+    std::array::from_fn(|axis| brick[axis] + step[axis])
 }

@@ -7,5 +7,5 @@ mod cells;
 mod guard;
 mod marks;
 
-pub(crate) use guard::{BrickCells, Clearance, near_set};
-pub(crate) use marks::{BrickMarks, Marks};
+pub(crate) use guard::{AROUND, BrickCells, Clearance, near_set};
+pub(crate) use marks::{BrickMarks, Marks, MarksAround, Step, moved};

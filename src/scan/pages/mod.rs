@@ -15,5 +15,5 @@ pub(crate) use counted_page::{BrickCounts, CountedPage, MAX_RAYS};
 pub(crate) use footprint::Footprint;
 pub(crate) use marked_page::{MarkedBrick, MarkedPage, WORDS};
 pub(crate) use page_map::PageMap;
-pub(crate) use sparse_page::{brick_in_page, part_of_place, place_in_page};
+pub(crate) use sparse_page::{PAGE_BRICKS, brick_in_page, part_of_place, place_in_page};
 pub(crate) use window::{Local, PAGE_EDGE, Window};
