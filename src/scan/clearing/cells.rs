@@ -96,13 +96,15 @@ pub(super) fn between_voxels<const AXIS: usize>(
     lower: &BrickMask,
     upper: &BrickMask,
 ) -> BrickMask {
-    std::array::from_fn(|word| {
+    let mut found = [0; 8];
+    for word in 0..8 {
         // Bit `AXIS` of a word's number is its position along the axis.
         let other = word ^ 1 << AXIS;
         let (lower, upper) =
             if word >> AXIS & 1 == 1 { (brick[other], upper[other]) } else { (lower[other], brick[other]) };
-        between::<AXIS>(brick[word], lower, upper)
-    })
+        found[word] = between::<AXIS>(brick[word], lower, upper);
+    }
+    found
 }
 
 /// Returns the voxels of a brick that are in the set or have a neighbor along an axis that is.
@@ -112,12 +114,14 @@ pub(super) fn dilated<const AXIS: usize>(
     lower: &BrickMask,
     upper: &BrickMask,
 ) -> BrickMask {
-    std::array::from_fn(|word| {
+    let mut found = [0; 8];
+    for word in 0..8 {
         let other = word ^ 1 << AXIS;
         let (lower, upper) =
             if word >> AXIS & 1 == 1 { (brick[other], upper[other]) } else { (lower[other], brick[other]) };
-        dilated_block::<AXIS>(brick[word], lower, upper)
-    })
+        found[word] = dilated_block::<AXIS>(brick[word], lower, upper);
+    }
+    found
 }
 
 /// Returns the cells of 2 x 2 x 2 voxels with at least one voxel of a brick's set.

@@ -109,6 +109,9 @@ impl Clearance {
         let first: VoxelIndex = index.map(|k| k * CELLS_EDGE);
         let sides = std::array::from_fn(|axis| sides_behind(first[axis], self.origin[axis]));
         let hits = Blocks::on_sides(sides, |step| marks.hit_cells(step));
+        if hits.are_empty() {
+            return 0;
+        }
         let reach = i32::from(self.guard.approach_cells());
         // Few cells have a hit on these sides at the right distance.
         let mut candidates = cells & hits.reached(sides, reach);
@@ -176,6 +179,10 @@ impl Blocks {
         Self(row(z, |z| row(y, |y| row(x, |x| of([x, y, z])))))
     }
 
+    fn are_empty(&self) -> bool {
+        self.0.as_flattened().as_flattened().iter().fold(0, |all, block| all | block) == 0
+    }
+
     fn at(&self, step: Step) -> u64 {
         let [x, y, z] = step.map(|step| (step + 1) as usize);
         self.0[z][y][x]
@@ -233,16 +240,14 @@ fn open_voxels(misses: &BrickMask, mut open: BrickMask, marks: &impl MarksAround
 /// Returns the items of a set of 8 x 8 x 8 items that are in it or have one of their 26 neighbors in it. `of` returns
 /// the set at a step, and is called for the bricks on these sides.
 pub(crate) fn near_set([x, y, z]: [Sides; 3], of: impl Fn(Step) -> BrickMask) -> BrickMask {
-    let along_x = |y: i32, z: i32| {
-        let [lower, middle, upper] = row(x, |x| of([x, y, z]));
-        dilated::<0>(&middle, &lower, &upper)
-    };
-    let along_y = |z: i32| {
-        let [lower, middle, upper] = row(y, |y| along_x(y, z));
-        dilated::<1>(&middle, &lower, &upper)
-    };
-    let [lower, middle, upper] = row(z, along_y);
-    dilated::<2>(&middle, &lower, &upper)
+    let along_x = |y: i32, z: i32| dilated_row::<0>(&row(x, |x| of([x, y, z])));
+    let along_y = |z: i32| dilated_row::<1>(&row(y, |y| along_x(y, z)));
+    dilated_row::<2>(&row(z, along_y))
+}
+
+/// As [`dilated`], for the bricks below, in the middle and above. Few rows have hits.
+fn dilated_row<const AXIS: usize>(row: &[BrickMask; 3]) -> BrickMask {
+    if row.iter().all(is_empty) { [0; 8] } else { dilated::<AXIS>(&row[1], &row[0], &row[2]) }
 }
 
 /// Returns on which sides a brick's voxels have neighbors in other bricks.
