@@ -22,7 +22,7 @@ fn config() -> MapConfig {
     MapConfig::new(0.2, 10.0).expect("whole voxels").with_range(0.0, 30.0).with_cache_tiles(1000)
 }
 
-/// In the build folder, because the system's folder for temporary files may be in memory.
+/// Creates a temporary folder in the build folder, because the system's temporary folder may be in memory.
 fn temporary_folder() -> TempDir {
     tempfile::tempdir_in(env!("CARGO_TARGET_TMPDIR")).expect("a folder in the build directory")
 }
@@ -95,7 +95,7 @@ fn grow(mapper: &mut OutOfCoreTileMapper, bytes: u64) -> Vec<Scan> {
     scans
 }
 
-/// Measures a flush of all tiles, which the scans make dirty again before.
+/// Inserts the scans, which makes all tiles dirty, and returns the time of the flush.
 fn time_flush(mapper: &mut OutOfCoreTileMapper, scans: &[Scan]) -> Duration {
     for scan in scans {
         mapper.insert_scan(scan).expect("a scan that can be mapped");

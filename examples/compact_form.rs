@@ -43,7 +43,7 @@ fn row(map: &Path, repeats: usize) -> Result<String, Box<dyn Error>> {
     let octree = octree_seconds(map, &tables, repeats)?;
     for (bytes, (table, voxels)) in small.iter().zip(&tables) {
         let again = reader.read(&mut &bytes[..], bytes.len() as u64, voxels)?;
-        assert!(again.iter().eq(table.iter()), "what is read is what was written");
+        assert!(again.iter().eq(table.iter()), "the decoded table equals the encoded one");
     }
     let [fast, small] = [fast, small].map(|tiles| a_voxel(tiles.iter().map(Vec::len).sum::<usize>() as f64));
     let name = map.file_name().unwrap_or_default().display();

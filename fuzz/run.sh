@@ -28,7 +28,7 @@ RUSTFLAGS="-Cpasses=sancov-module -Cllvm-args=-sanitizer-coverage-level=4 \
 -Cllvm-args=-sanitizer-coverage-trace-compares --cfg fuzzing" \
     cargo build --release --locked --target "$triple" "${bins[@]}"
 
-# Keeps all named inputs of the corpus (seeds and findings), and adds few and small files.
+# Keeps all named inputs of the corpus (seeds and findings), and adds at most 48 small inputs that reach other code.
 minimize() {
     local target=$1 program=$2 kept
     kept=target/minimized
@@ -37,7 +37,7 @@ minimize() {
     find "corpus/$target" -name '*-*' -exec cp {} "$kept" \;
     "$program" -set_cover_merge=1 -use_counters=0 -max_len=1024 -rss_limit_mb=1024 -timeout=10 \
         "$kept" "corpus/$target" "target/corpus/$target" >"target/$target.log" 2>&1
-    # The files with the most coverage are listed first, each named by 40 digits.
+    # Keep the first 48 files, which cover most code. Files that the fuzzer found are named by 40 digits.
     ls -tr "$kept" | { grep -v -e - || true; } | tail -n +49 | while read -r file; do rm "$kept/$file"; done
     rm -r "corpus/$target"
     mv "$kept" "corpus/$target"
@@ -60,7 +60,7 @@ fuzz() {
     [[ -z $outcome ]]
 }
 
-# Readers that take paths read their files in memory, where possible.
+# Targets whose reader takes a path write the input to a temporary file, in memory if possible.
 TMPDIR=$(mktemp -d -p /dev/shm 2>/dev/null || mktemp -d)
 export TMPDIR
 trap 'rm -rf "$TMPDIR"' EXIT

@@ -38,7 +38,7 @@ if [[ $short ]]; then
 else
     CARGO_PROFILE_DEV_OPT_LEVEL=1 MATURIN_PEP517_ARGS="--profile dev --locked" install .
 fi
-# Next to the sources, Python would import the package without its module.
+# Run the tests in another folder: here, Python would import the source folder, which lacks the compiled module.
 cp -r tests "$work/tests"
 cp -r examples "$work/examples"
 mkdir "$work/docs"

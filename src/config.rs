@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 use std::fmt;
 pub use storage::Storage;
 
-/// Valid texts are far shorter.
+/// Maximum length of a coordinate reference system in bytes. Valid texts are far shorter.
 const MAX_CRS_BYTES: usize = 1 << 16;
 
 /// Parameters of a map, and limits of its use of memory.
@@ -47,7 +47,7 @@ pub struct MapConfig {
     pub octree: OctreeConfig,
     /// Memory limit of an out-of-core mapper. Default: 512 MiB, or the minimum for tiles of this size if that is more.
     pub memory: MemoryLimit,
-    /// Storage of the tiles of a new map. Default: the original files.
+    /// Storage of the tiles of a new map. Default: [`Storage::OctoMap`].
     pub storage: Storage,
     /// Coordinate reference system of the map's frame: well-known text, or for example `EPSG:25832`. It does not affect
     /// voxels, but is written to exports whose format supports it. Default: none.
@@ -73,7 +73,7 @@ pub enum MemoryLimit {
         /// it. A larger value reduces reads and writes.
         write_buffer_bytes: usize,
     },
-    /// Maximum bytes of all variable memory: active tiles, tiles in the compact form, pending updates, buffers of scan
+    /// Maximum bytes of all variable memory: active tiles, compressed tiles in memory, pending updates, buffers of scan
     /// insertion, tiles in transfer from and to disk, and the index of tiles on disk (about 250 bytes per tile).
     /// Separate threads read and write tiles. At least [`MemoryLimit::min_bytes`].
     Bytes(usize),
@@ -137,18 +137,18 @@ pub enum OctreeConfig {
     Pointers(VoxelCacheMode),
 }
 
-/// Path of a tile's updates to its pointer tree.
+/// Cache between a tile's updates and its pointer tree.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum VoxelCacheMode {
-    /// Direct: every update modifies the tree individually (OctoMap).
+    /// No cache: every update modifies the tree individually (OctoMap).
     Off,
-    /// A voxel cache. After each scan, evicted voxels are written to the tree (OctoCache, serial).
+    /// A voxel cache. After each scan, the voxels that it evicts are written to the tree (OctoCache, serial).
     Serial(VoxelCacheConfig),
     /// Like `Serial`, with one thread per mapper that writes the trees (OctoCache, parallel).
     Parallel(VoxelCacheConfig),
 }
 
-/// Shape of the voxel cache of each tile's pointer tree.
+/// Size of the voxel cache of each tile's pointer tree.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct VoxelCacheConfig {
@@ -375,13 +375,13 @@ impl MapConfig {
     /// Log-odds from which a voxel counts as occupied.
     #[inline]
     pub fn occupied_log_odds(&self) -> f64 {
-        // Every query calls this. The default needs no logarithm.
+        // Every query calls this, so the logarithm is avoided for the default.
         if self.occupancy_threshold == 0.5 { 0.0 } else { logit(self.occupancy_threshold) }
     }
 }
 
 impl VoxelCacheMode {
-    /// Shape of the caches, if there are any.
+    /// Size of the caches, if there are any.
     pub fn cache(self) -> Option<VoxelCacheConfig> {
         match self {
             Self::Off => None,
@@ -391,7 +391,7 @@ impl VoxelCacheMode {
 }
 
 impl VoxelCacheConfig {
-    /// Returns a shape with this `tau` and number of buckets. [`MapConfig::validated`] checks the values.
+    /// Returns the size with this `tau` and number of buckets. [`MapConfig::validated`] checks the values.
     pub fn new(tau: usize, buckets: impl Into<Option<usize>>) -> Self {
         Self { tau, buckets: buckets.into() }
     }

@@ -8,8 +8,8 @@ pub fn logit(probability: f64) -> f64 {
     libm::log(probability / (1.0 - probability))
 }
 
-/// Smallest log-odds that count as a probability: the smaller of its logit in double and in single precision. OctoMap's
-/// files contain the latter.
+/// Smallest log-odds that count as reaching a probability: the smaller of its logit in double precision and in single
+/// precision. OctoMap's files contain log-odds in single precision.
 pub fn least_logit(probability: f64) -> f64 {
     let exact = logit(probability);
     exact.min(f64::from(exact as f32))

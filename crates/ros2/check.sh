@@ -2,7 +2,7 @@
 # Tests the node with an independent peer over loopback (Cyclone DDS from PyPI; for zenoh, eclipse-zenoh). The map of
 # the node and the map that `voxtile build` creates from the same messages must have the same digest, even with a
 # hostile peer. Outputs must equal those of `voxtile export`; services are also called. Passes with a message if Python
-# or PyPI is missing. The kind rclpy uses ROS 2 itself: rclpy of Jazzy over Fast DDS, from PyPI (for Python 3.11).
+# or PyPI is missing. The test `rclpy` uses ROS 2 itself: rclpy of Jazzy over Fast DDS, from PyPI (for Python 3.11).
 #
 # check.sh [friendly] [hostile] [types] [variants] [odometry] [launch] [path] [real] [sensors] [flood] [rclpy] [zenoh]
 #
@@ -12,7 +12,7 @@
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 
-# Some of the kinds run in other folders, so make the path absolute.
+# Some tests run in other folders, so make the path absolute.
 built=$(realpath -m "${CARGO_TARGET_DIR:-target}")/debug
 work=$(mktemp -d)
 node= listener=
@@ -70,7 +70,7 @@ listen() {
     listener=$!
 }
 
-# Plays the messages of a kind to the node.
+# Plays the messages of a test to the node.
 play() {
     case $kind in
     odometry) start --resolution $resolution $outputs --odometry /odom --frame-id odom ;;
@@ -103,7 +103,8 @@ built_of() {
     "$voxtile" build "$work/$kind.bag" "$@" --resolution $resolution --tile-size 10 --max-range 60 >/dev/null
 }
 
-# Sends more clouds than the queue holds: they are counted, memory remains bounded, and the node continues to map.
+# Sends more clouds than the queue holds: the dropped ones are counted, memory remains bounded, and the node continues
+# to map.
 flood() {
     local clouds=1500 grown received dropped waiting mapped_before mapped without
     start --memory 128MiB --transform-wait 100 --resolution 0.1

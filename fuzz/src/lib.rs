@@ -18,8 +18,8 @@ const MAX_BYTES: usize = 64 << 20;
 static ALLOCATOR: Cap<System> = Cap::new(System, MAX_BYTES);
 
 /// Lets panics of the crates `las` and `e57` unwind to our readers, which convert them to errors; the panic hook of
-/// libFuzzer would end the program first. A panic that passes all readers still ends it in libFuzzer's own frame. The
-/// memory limit applies to these crates, too, because no reader could catch a failed allocation.
+/// libFuzzer would end the program first. A panic that no reader catches still ends the program, in libFuzzer's own
+/// frame. The memory limit applies to these crates, too, because no reader could catch a failed allocation.
 pub fn catch_panics() {
     std::panic::set_hook(Box::new(|_| {}));
 }

@@ -60,7 +60,7 @@ pub fn config_of(py: Python<'_>, arguments: &ConfigArguments<'_, '_>) -> PyResul
     config.validated().map_err(raised)
 }
 
-/// Returns the rule for the voxels that rays pass.
+/// Returns the clearing rule with this name.
 pub fn clearing_of(py: Python<'_>, name: &str) -> PyResult<Clearing> {
     let known = clearings().into_iter().find(|(known, _)| *known == name);
     known

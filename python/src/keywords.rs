@@ -106,7 +106,7 @@ impl<'py> Keywords<'py> {
         parse(&text).map(Some).map_err(|error| wrong(value.py(), name, format!("{value:?}: {error}")))
     }
 
-    /// Reports the first keyword that was not taken as unexpected.
+    /// Returns an error for the first keyword that was not taken.
     pub fn end(self) -> PyResult<()> {
         let Some(name) = self.left.keys().into_iter().next() else { return Ok(()) };
         let name = name.to_string();

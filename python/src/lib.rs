@@ -11,7 +11,7 @@
 //! options        options of builds and exports from keywords
 //! keywords       typed access to keyword arguments
 //! command        the command `voxtile`
-//! watched        work without the interpreter's lock, which Ctrl-C ends
+//! watched        work without the interpreter's lock; Ctrl-C ends the work
 //! ```
 //!
 //! The package around it is `python/voxtile/`; its documentation for users is `docs/python.md`.

@@ -48,7 +48,8 @@ pub struct Map {
     path: PathBuf,
     /// Name of the snapshot, if the map is one.
     snapshot: Option<String>,
-    /// Whether recent queries took long. The next ones then start in a thread of their own, so that none runs twice.
+    /// Whether the last query took long. Long queries on the calling thread are stopped and repeated in a thread of
+    /// their own, so the next queries start in such a thread.
     is_slow: AtomicBool,
 }
 

@@ -331,7 +331,8 @@ pub fn decay<'py>(
 }
 
 /// Checks every file of a map. Returns a dict of sums, with a list of problems in `"findings"`. The map is intact if
-/// `"damage"` is 0. With `tiles`, only these are checked; with `but_tiles`, all except tiles.
+/// `"damage"` is 0. With `tiles`, only the files of these tiles are checked; with `but_tiles`, all files that belong to
+/// no tile.
 #[pyfunction]
 #[pyo3(signature = (map, *, tiles=None, but_tiles=false, progress=None))]
 pub fn verify<'py>(

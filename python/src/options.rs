@@ -14,7 +14,7 @@ use voxtile_pipeline::{BuildOptions, ExportOptions, SensorModelKind, WhenBehind,
 pub const STORAGES: [(&str, Storage); 2] = [("octomap", Storage::OctoMap), ("compact", Storage::Compact)];
 pub const INSERT_MODES: [(&str, InsertMode); 2] =
     [("per-scan", InsertMode::PerScan), ("per-ray", InsertMode::PerRay)];
-/// Rules for the voxels that rays pass, by keyword.
+/// Clearing rules by their names in Python.
 pub fn clearings() -> [(&'static str, Clearing); 2] {
     [("octomap", Clearing::Octomap), ("guarded", Clearing::guarded())]
 }
@@ -27,7 +27,7 @@ const WHICH_VOXELS: [(&str, WhichVoxels); 3] =
 /// Whether the box of ignored points is in the body's frame.
 const FRAMES: [(&str, bool); 2] = [("sensor", false), ("body", true)];
 
-/// Returns how scans are read: `voxtile.files.ReadOptions`.
+/// Takes the options for reading scans (`voxtile.files.ReadOptions`) from the keywords.
 pub fn read_options(py: Python<'_>, keywords: &mut Keywords<'_>) -> PyResult<ReadOptions> {
     let raised = |error: voxtile::Error| exception(py, &error);
     let mut options = ReadOptions::default();
@@ -69,7 +69,7 @@ pub fn read_options(py: Python<'_>, keywords: &mut Keywords<'_>) -> PyResult<Rea
     Ok(options)
 }
 
-/// Returns how a map is built: `voxtile.files.BuildOptions`.
+/// Takes the options of a build (`voxtile.files.BuildOptions`) from the keywords.
 pub fn build_options(
     py: Python<'_>,
     scans: &Path,
@@ -112,7 +112,7 @@ pub fn build_options(
     Ok(options)
 }
 
-/// Returns how a map is exported: `voxtile.files.ExportOptions`.
+/// Takes the options of an export (`voxtile.files.ExportOptions`) from the keywords.
 pub fn export_options(
     py: Python<'_>,
     map: PathBuf,

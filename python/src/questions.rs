@@ -29,7 +29,7 @@ pub fn bodies_of(boxes: &Bound<'_, PyAny>) -> PyResult<Vec<Shape>> {
     Ok(corners.as_chunks().0.iter().map(body).collect())
 }
 
-/// Writes the exact evidence at each point, converted by `of`.
+/// Returns the exact evidence at each point, converted by `of`.
 pub fn evidences<T>(
     source: &Source,
     stop: &Stop,

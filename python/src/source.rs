@@ -8,7 +8,7 @@ use std::time::Duration;
 use voxtile::mapper::{LiveReader, MapReader, MapView, Mapper, OctreeMap, Stoppable};
 use voxtile::{Error, MapConfig, OutOfCoreTileMapper, Result, Stop, octree};
 
-/// A view of a map that stops at the next tile once its stop is set.
+/// View of a map whose queries end with an error at the next tile after its stop is set.
 pub type View<'a> = Stoppable<'a, dyn MapView + 'a>;
 
 /// An open map.
@@ -94,7 +94,8 @@ impl Source {
         changed(&mut guard, stop, change)
     }
 
-    /// Changes the map if no other thread uses it now. Otherwise, or if the map is closed, `change` is left untouched.
+    /// Calls `change` if no other thread uses the map now. Otherwise, or if the map is closed, returns `None` and
+    /// leaves `change` in its place, so that the caller can retry.
     pub fn change_if_free<T, C>(&self, stop: &Stop, change: &mut Option<C>) -> Result<Option<T>>
     where
         C: FnOnce(&mut OutOfCoreTileMapper) -> Result<T>,
@@ -107,7 +108,8 @@ impl Source {
         }
     }
 
-    /// Returns whether a query would wait for no other thread. A refresh blocks the queries of a reader.
+    /// Returns whether a query can run without waiting for another thread. Only queries of a reader wait, for a
+    /// refresh.
     pub fn is_free(&self) -> bool {
         match self {
             Self::Reader(reader) => reader.try_read().is_some(),

@@ -1,4 +1,4 @@
-//! Work without the interpreter's lock, which Ctrl-C ends.
+//! Work without the interpreter's lock. Ctrl-C ends the work.
 
 use crate::errors::exception;
 use parking_lot::{Condvar, Mutex};

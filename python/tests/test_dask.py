@@ -111,7 +111,7 @@ def test_a_function_of_the_tiles_sees_every_voxel_once(client: object, drive: Pa
     assert len(found) == len(tiles) > 20
     assert sum(count for count, _ in found) == occupied > 0
     assert np.isclose(sum(total for _, total in found), np.nansum(dense))
-    # In the given order, and of a snapshot.
+    # Results have the given order, also for a snapshot.
     some = [tuple(int(number) for number in tile) for tile in tiles[:3]]
     back = voxtile_dask.map_tiles(tmp_path / "map", _occupied, tiles=some[::-1]).compute()
     assert back == found[:3][::-1]
@@ -280,7 +280,7 @@ def test_parts_of_an_abandoned_call_are_not_used(
         broken.setattr("voxtile.dask.building.join", fail)
         with pytest.raises(errors.DiskError, match="full"):
             voxtile_dask.build(drive, tmp_path / "map", region_size=4.0, client=client, **OPTIONS)
-    # The folder was removed; these parts come from tasks that were still running.
+    # As if the folder had been removed and a task that was still running had written a part.
     (tmp_path / "map.parts" / "map_id.json").unlink()
     for part in list((tmp_path / "map.parts").glob("*-*-*"))[1:]:
         shutil.rmtree(part)

@@ -114,7 +114,7 @@ def test_array_queries_during_inserts(tmp_path: Path, threads: int) -> None:
     print(done.stdout)
 
 
-def test_two_threads_two_maps_and_one(tmp_path: Path) -> None:
+def test_threads_insert_into_different_maps_and_into_the_same(tmp_path: Path) -> None:
     scans = scans_of(2, count=12, points=1000)
 
     def insert(into: voxtile.Map) -> None:

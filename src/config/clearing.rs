@@ -2,7 +2,8 @@ use crate::error::{Error, Result};
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
-/// Rule for the voxels that the rays of a scan pass, in insertion per scan. A map has one rule from its creation on.
+/// Rule for the voxels that the rays of a scan pass, used with [`InsertMode::PerScan`](crate::InsertMode::PerScan). A
+/// map has one rule from its creation on.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Clearing {
@@ -33,8 +34,8 @@ pub struct Guard {
     pub approach_voxels: u8,
 }
 
-/// Distance in voxels up to which a hit or miss can affect whether other misses are weak: the far end of a cell at the
-/// largest approach.
+/// Maximum distance in voxels at which a hit or miss can change whether another miss is weak: the far side of a cell at
+/// the largest value of `approach_voxels`.
 pub(crate) const GUARD_REACH: i32 = 9;
 
 impl Default for Guard {
@@ -63,7 +64,7 @@ impl Guard {
         }
     }
 
-    /// Maximum distance in cells of 2 x 2 x 2 voxels.
+    /// Returns [`Guard::approach_voxels`] in cells of 2 x 2 x 2 voxels.
     pub(crate) fn approach_cells(self) -> u8 {
         self.approach_voxels / 2
     }

@@ -40,7 +40,7 @@ pub(super) struct WholePoints {
 }
 
 impl WholePoints {
-    /// Checks the points of a scan, unless that was done.
+    /// Checks the points of a scan, if they were not checked before.
     ///
     /// # Errors
     ///

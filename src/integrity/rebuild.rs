@@ -83,7 +83,7 @@ fn clear_scan_records(metadata: &mut Metadata) {
     }
 }
 
-/// Returns id and metadata of the log, if the log ends with the last flush.
+/// Returns id and metadata of the log, if the log is known to end with the last flush.
 fn identity_from_log(
     disk: &dyn Disk,
     layout: &Layout,
@@ -93,7 +93,7 @@ fn identity_from_log(
         return Ok(None);
     };
     let Some(logged_id) = id_of(logged) else { return Ok(None) };
-    // The torn record may belong to a flush that was committed or to one that was not.
+    // The incomplete last record may belong to a flush that was committed or to one that was not.
     let is_whole = remains.commits.torn.is_none();
     let is_last = match &remains.metadata {
         Ok(Metadata { ext: Some(ext), .. }) if ext.map_id == hex(&map_id) => {
@@ -245,7 +245,8 @@ impl Index {
         let read = |file: &Path| read_alone(disk, file, layout.storage(), &config.grid, self.map_id, tile);
         let (current, next) = (layout.current(tile, TileFile::Table), layout.next(tile, TileFile::Table));
         let table = match (read(&current)?, read(&next)?) {
-            // Written before the last known flush, so it was part of it and should have replaced the other table.
+            // The `*.next` table is older than the last known flush, so that flush contains it, and it should have
+            // replaced the current table.
             (Some(Ok(table)), Some(Ok(next)))
                 if scan_number_of(&table) < scan_number_of(&next) && scan_number_of(&next) <= known_scan =>
             {
@@ -361,7 +362,7 @@ impl Trailers {
         Self { by_map }
     }
 
-    /// Returns whether the tiles belong only to other maps, and there are some.
+    /// Returns whether there are tiles, and all of them belong to other maps.
     fn are_of_others(&self, map_id: [u8; 16]) -> bool {
         !self.by_map.is_empty() && !self.by_map.contains_key(&map_id)
     }

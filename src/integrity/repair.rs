@@ -149,7 +149,7 @@ impl<F: FnMut(&Action), P: FnMut(u64, u64)> Repairer<'_, F, P> {
         Ok(())
     }
 
-    /// Removes a tile from the map. Tables that snapshots use remain.
+    /// Moves the files of a tile to quarantine, except for tables that snapshots use.
     fn quarantine_tile(&mut self, tile: TileIndex, why: &str) -> Result<()> {
         let folder = self.layout.tile_folder(tile);
         let names = match self.kind(&folder)? {
@@ -177,7 +177,7 @@ impl<F: FnMut(&Action), P: FnMut(u64, u64)> Repairer<'_, F, P> {
         self.disk.kind_at(path)
     }
 
-    /// Moves anything that is not a regular file out of the way of the lock file.
+    /// Moves the lock file to quarantine if it is not a regular file.
     fn repair_lock(&mut self) -> Result<()> {
         let path = self.layout.lock();
         match self.kind(&path)? {
@@ -225,7 +225,7 @@ impl<F: FnMut(&Action), P: FnMut(u64, u64)> Repairer<'_, F, P> {
         self.layout = remains.layout_of_tiles(self.disk, self.layout.folder());
         let index = rebuild::index_of(self.disk, &self.layout, &remains, &mut self.progress)?;
         let Some(index) = index else {
-            // A map of the original format with an unreadable log, which is not part of it.
+            // A map of the original format has no log, so the unreadable `commits.log` is not part of it.
             if self.kind(&self.layout.kept_scans())?.is_some() {
                 self.quarantine(&self.layout.kept_scans(), "metadata.json is of the original format")?;
             }
@@ -344,7 +344,7 @@ impl<F: FnMut(&Action), P: FnMut(u64, u64)> Repairer<'_, F, P> {
         }
         if !lost.is_empty() {
             if store.map_id().is_none() {
-                // It may have keys that voxtile does not know.
+                // `metadata.json` may have keys that voxtile does not know.
                 self.quarantine_copy(&self.layout.metadata(), "its bounds will change")?;
             }
             store.forget(&lost)?;
@@ -365,7 +365,7 @@ impl<F: FnMut(&Action), P: FnMut(u64, u64)> Repairer<'_, F, P> {
         Ok(())
     }
 
-    /// Repairs a tile of the map. Returns false if it must be removed.
+    /// Repairs a tile of the map. Returns false if the tile must be removed from the map.
     fn repair_tile(&mut self, store: &mut TileStore, config: &MapConfig, tile: TileIndex) -> Result<bool> {
         let mut check = check_tile(self.disk, store, config, tile)?;
         if matches!(&check.table, Err(error) if error.is_of_medium()) {
@@ -416,8 +416,8 @@ impl<F: FnMut(&Action), P: FnMut(u64, u64)> Repairer<'_, F, P> {
         Ok(true)
     }
 
-    /// Replaces a damaged table by a kept one if that is the version in the log, as a revert can leave it. Returns
-    /// false if there is none.
+    /// Replaces a damaged table by a kept table that has the checksum in the log. A revert can leave such a table.
+    /// Returns false if there is none.
     fn restore_table(&mut self, store: &mut TileStore, tile: TileIndex, why: &str) -> Result<bool> {
         let Some(version) = store.tiles().version(tile) else { return Ok(false) };
         // Unreadable files are skipped.

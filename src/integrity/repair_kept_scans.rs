@@ -27,7 +27,8 @@ impl<F: FnMut(&Action), P: FnMut(u64, u64)> Repairer<'_, F, P> {
         store.archive_mut().begin_catalog()?;
         let (disk, layout, points) = (self.disk, &self.layout, &mut self.points);
         let left = whole_entries(disk, layout, as_of, points, |entry| store.archive_mut().put(entry))?;
-        // An unreadable snapshot may need any file, so no writer removes any. They are moved when the snapshot is.
+        // An unreadable snapshot may need any file. Writers remove no files then, and the repair of the snapshots moves
+        // the unneeded ones.
         let snapshots = known_snapshots(store);
         if let Some(snapshots) = &snapshots {
             // Before the commit: as long as the damaged catalog is current, no writer removes any file, and a repeated
@@ -58,7 +59,7 @@ impl<F: FnMut(&Action), P: FnMut(u64, u64)> Repairer<'_, F, P> {
         Ok(())
     }
 
-    /// Moves anything that is not a readable folder out of the way of the folder of kept scans.
+    /// Moves the folder of kept scans to quarantine if it is not a folder, or cannot be listed.
     fn repair_folder_of_scans(&mut self, folder: &Path) -> Result<()> {
         if let Some(EntryKind::File(_) | EntryKind::Other) = self.kind(folder)? {
             return self.quarantine(folder, "not a folder");
@@ -183,7 +184,8 @@ impl<F: FnMut(&Action), P: FnMut(u64, u64)> Repairer<'_, F, P> {
         }
         let kept = count_kept(self.disk, &self.layout)?;
         self.counts.scans_lost += kept;
-        // An unreadable snapshot may need any file, so no writer removes any. They are moved when the snapshot is.
+        // An unreadable snapshot may need any file. Writers remove no files then, and the repair of the snapshots moves
+        // the unneeded ones.
         let Some(snapshots) = known_snapshots(&store) else { return Ok(()) };
         let unneeded = store.unneeded_scan_files(&snapshots, None)?;
         for path in &unneeded {

@@ -38,7 +38,7 @@ impl<F: FnMut(&Action), P: FnMut(u64, u64)> Repairer<'_, F, P> {
         for snapshot in &mut snapshots {
             self.repair_snapshot(store, config, snapshot, &mut whole)?;
         }
-        // Before the log drops these snapshots: afterwards a writer removes files that no other one needs.
+        // Before the log drops these snapshots: afterwards a writer removes the files that no other snapshot needs.
         self.quarantine_unneeded_scans(store, &snapshots)?;
         if !gone.is_empty() {
             self.counts.snapshots_lost += gone.len() as u64;
@@ -90,7 +90,7 @@ impl<F: FnMut(&Action), P: FnMut(u64, u64)> Repairer<'_, F, P> {
             store.snapshot_writer().replace(&Snapshot { name: own, ..snapshot })?;
             self.note(ActionKind::Renamed, &path, "the snapshot had another name");
         }
-        // Copied already, and not listed.
+        // These files were copied to quarantine above, and the log does not list their names.
         for name in misnamed.iter().filter(|name| !listed.contains(name)) {
             self.quarantine(&self.layout.snapshot(name), "commits.log does not list this snapshot")?;
         }
@@ -121,8 +121,8 @@ impl<F: FnMut(&Action), P: FnMut(u64, u64)> Repairer<'_, F, P> {
         Ok(())
     }
 
-    /// Moves a damaged kept table to quarantine. If the snapshot's own table is missing, its name refers to another
-    /// version, which is intact and belongs to others.
+    /// Moves a damaged kept table to quarantine. If the snapshot's own table is missing, the table with this flush
+    /// number is intact and belongs to other snapshots: it remains.
     fn quarantine_if_damaged(
         &mut self,
         store: &TileStore,

@@ -7,8 +7,8 @@ use crate::space::TileIndex;
 use crate::store::{Disk, Layout, MAX_NUMBER, Snapshot, TileStore, TileVersion};
 use std::collections::BTreeMap;
 
-/// Kept tables that were read and are intact, with their versions. Several snapshots may use one table. A snapshot
-/// whose own table is missing may refer to another version.
+/// Kept tables that were read and are intact, with their versions. Several snapshots may use one table. The version is
+/// compared, because the look-up of a missing table finds the table of another version.
 pub(super) type WholeTables = BTreeMap<(TileIndex, u64), TileVersion>;
 
 /// Returns the tiles of a snapshot whose tables are not readable as the version that it names. Tables that the map also

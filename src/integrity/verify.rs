@@ -233,7 +233,7 @@ impl<F: FnMut(&Finding), P: FnMut(u64, u64)> Verifier<'_, F, P> {
 
     pub(super) fn report(&mut self, finding: Finding) {
         match finding.severity {
-            // A list of snapshots is checked again as a whole, including parts that were decided.
+            // A repeated check reads all snapshots again, and would report their known damage a second time.
             Severity::Damage if self.is_again && !self.reported.insert(finding.to_string()) => return,
             Severity::Damage => self.counts.damage += 1,
             Severity::Note if self.is_again => return,

@@ -9,7 +9,7 @@ use crate::space::{TileBox, TileIndex, TileSelection, VoxelIndex};
 use crate::tile::{OctreeFactory, Tile};
 use rayon::prelude::*;
 
-/// Map that is kept in memory only. It is divided into tiles and gives bit-identical answers to an
+/// Map that is kept in memory only. It is divided into tiles. Its answers are bit-identical to those of an
 /// [`OutOfCoreTileMapper`](super::OutOfCoreTileMapper).
 ///
 /// ```

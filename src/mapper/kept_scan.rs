@@ -10,7 +10,7 @@ use std::sync::Arc;
 
 /// Scan that a map keeps, bit-identical to the inserted one.
 ///
-/// As [`ScanPoints`], its points are in the world frame, transformed by its current pose.
+/// Its implementation of [`ScanPoints`] yields points in the world frame, transformed by its current pose.
 #[derive(Clone, Debug)]
 pub struct KeptScan {
     record: KeptRecord,

@@ -6,7 +6,7 @@ use std::sync::Arc;
 /// Largest number of points of a kept scan that are read into memory (7 MiB). Larger scans are read at each use.
 const MAX_POINTS_IN_MEMORY: u64 = 1 << 18;
 
-/// Iterator over the scans that a map keeps, in order. Each scan is read on its own.
+/// Iterator over the scans that a map keeps, in order. It reads one scan at a time.
 #[derive(Debug)]
 pub struct KeptScans {
     disk: Arc<dyn Disk>,

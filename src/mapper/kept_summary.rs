@@ -88,7 +88,7 @@ impl KeptSummary {
     ///
     /// # Errors
     ///
-    /// Fails if the map has other content, and names it.
+    /// Fails if the map has other content. The error names this content.
     pub fn check_keeps_all(&self) -> Result<()> {
         match &self.refusal {
             None => Ok(()),
@@ -133,7 +133,7 @@ impl KeptScanHead {
         Self { number, stamp_ns, world_from_sensor, updates, segment: place.segment }
     }
 
-    /// Creates a head for tests.
+    /// Creates a summary of a scan, for tests.
     #[doc(hidden)]
     pub fn new(number: u64, stamp_ns: Option<i64>, world_from_sensor: Option<Pose>) -> Self {
         Self { number, stamp_ns, world_from_sensor, updates: 0, segment: 0 }

@@ -21,9 +21,9 @@ use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 /// Map on disk, opened for queries. It takes no lock and never writes, and may be used while a writer is active.
 ///
-/// It sees the complete last flush before it was opened, however often a writer flushes since: the writer keeps the
-/// files that the reader sees. Only where the file system has no locks, or if another writer was started since, a read
-/// of a changed tile fails with [`Error::Changed`]: open the map again.
+/// It sees the last flush that was complete when it was opened, even if a writer flushes again: the writer keeps the
+/// files that the reader sees. Two cases are exceptions: a file system without locks, and another writer that was
+/// started later. A read of a changed tile may then fail with [`Error::Changed`]: open the map again.
 #[derive(Debug)]
 pub struct MapReader {
     config: MapConfig,
@@ -45,7 +45,7 @@ struct ReaderCache {
     bytes: usize,
     max_tiles: usize,
     max_bytes: usize,
-    /// Tiles not in memory of which one voxel was read.
+    /// Tiles that are not in memory, but of which one voxel was already read from the file.
     read_once: LruCache<TileIndex, ()>,
     io: IoCounts,
 }
@@ -94,7 +94,8 @@ impl ReaderCache {
     }
 }
 
-/// Returns the configuration of a map. Settings that concern only a run have their defaults.
+/// Returns the configuration of a map. Settings that the map does not store, such as the memory limit, have their
+/// defaults.
 fn config_of_store(store: &TileStore) -> Result<MapConfig> {
     config_from(store.metadata(), &store.layout().metadata())?.validated()
 }
@@ -184,8 +185,8 @@ impl MapReader {
         Ok(is_newer)
     }
 
-    /// Reads the configuration that a map was created with, for example to continue it. Settings that concern only a
-    /// run have their defaults.
+    /// Reads the configuration that a map was created with, for example to continue it. Settings that the map does not
+    /// store, such as the memory limit, have their defaults.
     ///
     /// # Errors
     ///
@@ -245,8 +246,8 @@ impl MapReader {
         })
     }
 
-    /// The scans of the map in order, each with number, time stamp and origin. Batch updates and maps of earlier
-    /// versions have no records.
+    /// The scans of the map in order, each with number, time stamp and origin. A batch update has no record. Maps of
+    /// earlier versions of voxtile have no records at all.
     ///
     /// # Errors
     ///
@@ -343,7 +344,7 @@ impl MapReader {
     /// Announces the tiles after this one to a disk that reads ahead: uncached reads usually visit all tiles in order.
     fn read_ahead(&self, index: TileIndex) {
         let files = self.disk.files_ahead();
-        // A snapshot may see a kept table instead of the current one.
+        // For a snapshot, the current file of a tile may not be the one that will be read.
         if files == 0 || self.snapshot().is_some() {
             return;
         }
@@ -358,8 +359,8 @@ impl MapReader {
         self.explained(load::load(&self.store, &self.config.grid, &self.octrees, index))
     }
 
-    /// Runs `look` on the cache.
-    fn found<T>(&self, look: impl FnOnce(&mut ReaderCache) -> T) -> T {
+    /// Locks the cache and runs `look` on it.
+    fn with_cache<T>(&self, look: impl FnOnce(&mut ReaderCache) -> T) -> T {
         look(&mut self.cache.lock().unwrap_or_else(PoisonError::into_inner))
     }
 
@@ -421,13 +422,13 @@ impl MapView for MapReader {
     }
 
     fn tile(&self, index: TileIndex) -> Result<Option<TileRef<'_>>> {
-        if let Some(tile) = self.found(|cache| cache.get(index)) {
+        if let Some(tile) = self.with_cache(|cache| cache.get(index)) {
             return Ok(Some(TileRef::shared(tile)));
         }
-        // Loaded without the lock, so that other threads can use the cache.
+        // The tile is loaded without the lock on the cache, so that other threads can use it.
         let Some((tile, bytes)) = self.load(index)? else { return Ok(None) };
         let tile = Arc::new(tile);
-        self.found(|cache| {
+        self.with_cache(|cache| {
             cache.io.loads += 1;
             cache.io.bytes_read += bytes;
             cache.put(tile.clone());
@@ -439,7 +440,7 @@ impl MapView for MapReader {
     /// tile, because more will likely follow.
     fn evidence(&self, voxel: VoxelIndex) -> Result<Option<Evidence>> {
         let index = self.config.grid.tile_of_voxel(voxel);
-        let (tile, is_first) = self.found(|cache| {
+        let (tile, is_first) = self.with_cache(|cache| {
             let tile = cache.get(index);
             let is_first = tile.is_none() && cache.read_once.put(index, ()).is_none();
             (tile, is_first)
@@ -448,14 +449,14 @@ impl MapView for MapReader {
             return Ok(tile.evidence(voxel));
         }
         if is_first && let Some(found) = read_voxel(&self.store, &self.config.grid, voxel) {
-            self.found(|cache| cache.io.bytes_read += found.bytes);
+            self.with_cache(|cache| cache.io.bytes_read += found.bytes);
             return Ok(found.evidence);
         }
         Ok(self.tile(index)?.and_then(|tile| tile.evidence(voxel)))
     }
 
     fn tile_uncached(&self, index: TileIndex) -> Result<Option<TileRef<'_>>> {
-        if let Some((tile, _)) = self.found(|cache| cache.tiles.peek(&index).cloned()) {
+        if let Some((tile, _)) = self.with_cache(|cache| cache.tiles.peek(&index).cloned()) {
             return Ok(Some(TileRef::shared(tile)));
         }
         self.read_ahead(index);
@@ -464,7 +465,7 @@ impl MapView for MapReader {
     }
 
     fn voxels_from(&self, index: TileIndex, from: f64) -> Result<Vec<Voxel>> {
-        if let Some((tile, _)) = self.found(|cache| cache.tiles.peek(&index).cloned()) {
+        if let Some((tile, _)) = self.with_cache(|cache| cache.tiles.peek(&index).cloned()) {
             return Ok(tile.voxels_from(from).collect());
         }
         self.read_ahead(index);

@@ -15,7 +15,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 /// OctoMap file (`.bt` or `.ot`) as a map with the usual queries.
 ///
 /// The tree of the file is kept in memory, as in OctoMap. Tiles are built from it on demand. Voxels have the log-odds
-/// of the file, in a `.bt` file OctoMap's clamping values, and the observation count 0.
+/// of the file. A `.bt` file stores no log-odds; its voxels have OctoMap's clamping values. The observation count is 0.
 ///
 /// ```
 /// use voxtile::mapper::OctreeMap;
@@ -147,7 +147,7 @@ impl OctreeMap {
 
 /// Returns whether a file can be read and begins like an OctoMap file.
 fn begins_as_octree(path: &Path) -> bool {
-    /// Enough for the distinguishing part of the first line.
+    /// Number of bytes to read: enough for the distinguishing part of the first line.
     const FIRST_BYTES: u64 = 64;
     let mut first = Vec::new();
     let read = FsDisk.open(path).and_then(|file| file.take(FIRST_BYTES).read_to_end(&mut first));
@@ -252,7 +252,7 @@ impl MapView for OctreeMap {
         if let Some(tile) = cache().tiles.get(&index) {
             return Ok(Some(TileRef::shared(tile.clone())));
         }
-        // Built without the lock, so that other threads can use the cache.
+        // The tile is built without the lock on the cache, so that other threads can use it.
         let tile = self.make_tile(index);
         cache().put(index, &tile);
         Ok(Some(TileRef::shared(tile)))

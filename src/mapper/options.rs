@@ -17,7 +17,7 @@ use crate::store::{MapPath, SnapshotName};
 /// mapper.insert_scan(&Scan { origin: [0.0; 3], points: vec![[4.0, 0.0, 0.0]], intensities: None })?;
 /// mapper.flush()?;
 ///
-/// // While the mapper is open, in this process or another. The map stores its configuration.
+/// // Readers may be opened while the mapper is open, in this process or another. They need no configuration.
 /// let reader = MapOptions::new().memory_bytes(64 << 20).open_read_only(&folder)?;
 /// assert_eq!(reader.flush_number(), 1);
 /// # Ok(())
@@ -86,7 +86,7 @@ impl MapOptions {
                 let config = self.config.clone().unwrap_or_default();
                 return OutOfCoreTileMapper::create(map, self.with_memory(config));
             }
-            // Without a given configuration this error is returned below; otherwise `open` reports it.
+            // An error is returned below if no configuration is given; otherwise `open` reports it.
             own => own,
         };
         let config = match &self.config {
@@ -100,7 +100,7 @@ impl MapOptions {
     ///
     /// # Errors
     ///
-    /// Fails with [`Error::NoMap`] if there is no map, or if its list of tiles is damaged.
+    /// Fails with [`Error::NoMap`] if there is no map; also fails if its list of tiles is damaged.
     pub fn open_read_only(&self, map: impl Into<MapPath>) -> Result<MapReader> {
         MapReader::open_within(map.into(), self.reader_memory())
     }

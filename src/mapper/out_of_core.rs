@@ -74,8 +74,9 @@ impl OutOfCoreTileMapper {
         Ok(Self::new(config, store))
     }
 
-    /// Opens a map to continue it. Grid, sensor model, occupancy threshold and, if it is given, the rule of clearing of
-    /// `config` must be those of the map; [`MapReader::config_of`](super::MapReader::config_of) reads them.
+    /// Opens a map to continue it. Grid, sensor model and occupancy threshold of `config` must equal those of the map,
+    /// and so must the rule of clearing if `config` has one. [`MapReader::config_of`](super::MapReader::config_of)
+    /// reads them.
     ///
     /// # Errors
     ///
@@ -92,7 +93,7 @@ impl OutOfCoreTileMapper {
     }
 
     fn new(mut config: MapConfig, mut store: TileStore) -> Self {
-        // A map of the original format gets an archive with its first change.
+        // Scans are kept from the next commit on. A map of the original format is upgraded before its first change.
         if config.keeps_scans {
             store.archive_mut().begin();
         }
@@ -116,7 +117,7 @@ impl OutOfCoreTileMapper {
     }
 
     /// Resumes the last input of the map and returns how many of its scans the map contains: skip these and insert the
-    /// rest. A map without scans and inputs begins the input.
+    /// rest. If the map has neither scans nor inputs, this begins the input.
     ///
     /// # Errors
     ///
@@ -193,9 +194,9 @@ impl OutOfCoreTileMapper {
     /// [`OutOfCoreTileMapper::end_flush`] waits for it. If a background flush is running, this waits for it first.
     ///
     /// A tile that a scan changes before it is written is in memory twice; both copies count towards the limit. Evicted
-    /// tiles wait in the compact form; if these fill their share of the memory, the mapper waits for the flush. If the
-    /// map has so many small tiles that their lists would exceed a sixteenth of the limit, this call flushes before it
-    /// returns.
+    /// tiles remain in memory in compressed form until the flush has ended; if they fill their share of the memory, the
+    /// mapper waits for the flush. If the map has so many small tiles that the lists of tiles to write would exceed a
+    /// sixteenth of the limit, this call flushes before it returns.
     ///
     /// # Errors
     ///
@@ -290,7 +291,7 @@ impl OutOfCoreTileMapper {
         self.pager().reload(tile, discard_changes)
     }
 
-    /// Inserts a scan using `map`, and stores it if the map keeps scans.
+    /// Inserts a scan with the function `map`. If scans are kept, also stores the scan.
     fn insert(
         &mut self,
         scan: &dyn ScanPoints,
@@ -331,7 +332,7 @@ impl OutOfCoreTileMapper {
                     self.min_points_alone = scan.len().min(self.min_points_alone);
                     break;
                 }
-                // Inserted alone after the scans before it, it fails again with its own error.
+                // The caller inserts this scan alone, after the earlier ones, and then reports its error.
                 Err(_) => break,
             }
         }
@@ -462,7 +463,7 @@ impl OutOfCoreTileMapper {
         pager.flush()
     }
 
-    /// The pager, for one call. Queries take `&self` but may load tiles.
+    /// Locks the pager for one call. A lock is needed because queries take `&self` but may load tiles.
     fn pager(&self) -> TilePager<'_> {
         self.tiles.pager()
     }
@@ -677,7 +678,7 @@ mod tests {
             let refused = OutOfCoreTileMapper::create(folder.path().join("map"), config(crs)).unwrap_err();
             assert!(refused.to_string().contains("control character"), "{refused}");
             assert!(!folder.path().join("map").exists());
-            // A map that already has it opens.
+            // An existing map with this text can be opened.
             config(crs).validated().unwrap();
         }
         let wkt = "PROJCS[\"Gauß\",\r\n\tUNIT[\"metre\",1]]";

@@ -15,7 +15,7 @@ pub(crate) struct Remapper {
 }
 
 impl Remapper {
-    /// Begins with `tiles` emptied.
+    /// Opens the map for a replay into `tiles`, which are emptied.
     pub(crate) fn begin(
         mut store: TileStore,
         config: MapConfig,
@@ -70,8 +70,8 @@ impl Remapper {
         })
     }
 
-    /// Commits; then `release` removes files that are no longer needed, and its result is returned.
-    /// `have_poses_changed` invalidates the poses recorded with the map's inputs.
+    /// Commits; then `release` removes files that are no longer needed, and its result is returned. If
+    /// `have_poses_changed`, the poses recorded with the map's inputs are removed, because they are no longer valid.
     pub(crate) fn finish<T>(
         mut self,
         have_poses_changed: bool,

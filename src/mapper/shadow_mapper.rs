@@ -16,7 +16,7 @@ pub(crate) struct ShadowMapper {
 }
 
 impl ShadowMapper {
-    /// Begins an empty shadow map in `MAP.remapped` next to the map; the remains of an earlier attempt are removed.
+    /// Begins an empty shadow map in `MAP.remapping` next to the map; the remains of an earlier attempt are removed.
     ///
     /// # Errors
     ///

@@ -23,7 +23,7 @@ pub struct MapStatistics {
     pub buffered_bytes: u64,
     /// Bytes of buffered updates in spill files.
     pub spilled_bytes: u64,
-    /// Tiles in memory in the compact form; not included in the counts above.
+    /// Tiles in memory in the compact form, which is compressed; not included in the counts above.
     pub compact_tiles: u64,
     /// Tiles in the compact form that differ from their version on disk.
     pub dirty_compact_tiles: u64,
@@ -74,7 +74,7 @@ pub struct StallCounts {
 }
 
 impl MemoryCounts {
-    /// Sum of all.
+    /// Sum over all purposes.
     pub fn bytes(&self) -> u64 {
         self.tiles
             + self.compact_tiles
@@ -92,13 +92,13 @@ impl MemoryCounts {
 pub struct IoCounts {
     /// Tiles read.
     pub loads: u64,
-    /// Those of the tiles read that were read ahead of use.
+    /// Tiles read ahead of use; `loads` includes them.
     pub prefetches: u64,
     /// Tiles written.
     pub saves: u64,
-    /// Tiles encoded into the compact form.
+    /// Tiles encoded into the compact form in memory.
     pub encoded: u64,
-    /// Tiles decoded from the compact form.
+    /// Tiles decoded from the compact form in memory.
     pub decoded: u64,
     /// Queries and updates that found their tile in memory.
     pub hits: u64,

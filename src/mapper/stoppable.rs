@@ -66,12 +66,12 @@ impl<V: MapView + ?Sized> MapView for Stoppable<'_, V> {
         self.view.voxels_from(index, from)
     }
 
-    // No check for single points: callers with many points check the flag between them.
+    // The flag is not checked for single points: callers with many points check it between them.
     fn evidence(&self, voxel: VoxelIndex) -> Result<Option<Evidence>> {
         self.view.evidence(voxel)
     }
 
-    // No check, for the same reason.
+    // The flag is not checked: callers check it between look-ups.
     fn resident_tile(&self, index: TileIndex) -> Option<&Tile> {
         self.view.resident_tile(index)
     }

@@ -2,8 +2,8 @@ use crate::config::{MapConfig, OctreeConfig};
 use crate::scan::{MappedTiles, TraceRules, UpdateOrder};
 use crate::space::TileSelection;
 
-/// Returns the rules for tracing scans within the selected tiles, or all. The updates get the form that the map's tiles
-/// use.
+/// Returns the rules for tracing scans within the selected tiles, or in all tiles. The order of the updates is the one
+/// that the map's octrees need.
 pub(super) fn trace_rules<'a>(config: &'a MapConfig, tiles: Option<&'a TileSelection>) -> TraceRules<'a> {
     let MapConfig { grid, sensor_model: model, rays, .. } = config;
     let order = match config.octree {

@@ -32,14 +32,14 @@ pub trait MapView: Sync {
     /// Returns whether a tile contains observations. The cost does not depend on the number of tiles.
     fn has_tile(&self, index: TileIndex) -> bool;
 
-    /// A box of tiles around this one without observations, if the map knows one. The cost does not depend on the
-    /// number of tiles.
+    /// A box of tiles that contains this tile and no observations, if the map knows one. The cost does not depend on
+    /// the number of tiles.
     fn empty_around(&self, index: TileIndex) -> Option<TileBox> {
         let _ = index;
         None
     }
 
-    /// The tiles that are in memory, in the same order.
+    /// The tiles that are in memory, in the order of [`MapView::tile_indices`].
     fn cached_tile_indices(&self) -> Vec<TileIndex>;
 
     /// Returns a tile; `None` if it contains no observations. It remains in memory while the returned value exists, and
@@ -78,8 +78,9 @@ pub trait MapView: Sync {
         Ok(tile.and_then(|tile| tile.evidence(voxel)))
     }
 
-    /// Returns a tile, or an empty one if it contains no observations, if all tiles of the map are permanently in
-    /// memory: looking up a tile is then cheaper than grouping queries by tile. `None` for other maps.
+    /// Returns a tile of a map whose tiles are all permanently in memory, or an empty tile if it contains no
+    /// observations. Callers then look up each tile, which is cheaper than grouping queries by tile. `None` for other
+    /// maps.
     #[inline]
     fn resident_tile(&self, index: TileIndex) -> Option<&Tile> {
         let _ = index;
@@ -89,7 +90,8 @@ pub trait MapView: Sync {
     /// Approximate number of observed voxels in a tile, if known without reading it.
     fn voxels_of_tile_hint(&self, index: TileIndex) -> Option<u64>;
 
-    /// Committed version of a tile, if known without reading it: maps on disk that were opened for reading.
+    /// Committed version of a tile, known without reading the tile. `None` except for maps on disk that were opened for
+    /// reading.
     fn version_of_tile(&self, index: TileIndex) -> Option<TileVersion> {
         let _ = index;
         None

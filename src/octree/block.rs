@@ -84,7 +84,7 @@ impl Block {
     /// Largest value of the children.
     pub(super) fn max(&self) -> f32 {
         let [a, b, c, d, e, f, g, h] = self.values;
-        // In pairs, which halves the chain of comparisons.
+        // In pairs, so that each comparison waits for fewer earlier ones.
         larger(larger(larger(a, b), larger(c, d)), larger(larger(e, f), larger(g, h)))
     }
 

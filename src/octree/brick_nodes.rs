@@ -63,7 +63,8 @@ impl BrickNodes {
         if words == 0 {
             return 0;
         }
-        // The lowest bit of each byte, shifted by a different amount for each word, so that one count suffices.
+        // Counts the nonzero bytes of all words at once: the bits that mark them are shifted by the number of the word,
+        // so that they do not overlap.
         let bytes = (0..8).fold(0, |bytes, word| bytes | nonzero_bytes(self.known[word]) << word);
         let voxels: u32 = self.known.iter().map(|word| word.count_ones()).sum();
         let pruned =

@@ -15,7 +15,7 @@ pub struct BrickValues {
 struct Part {
     brick: BrickCode,
     known: BrickMask,
-    /// Start of its values, which are those of the known voxels in Morton order.
+    /// Index of its first value. The values are those of the known voxels in Morton order.
     first: u64,
 }
 

@@ -51,7 +51,7 @@ impl<'a> Leaves<'a> {
         leaves
     }
 
-    /// Returns the leaves that do not end before `code`.
+    /// Returns the leaves from the one that contains `code` on, or from the next one if no leaf contains it.
     pub(super) fn from(tree: &'a Octree, code: MortonCode) -> Self {
         let mut leaves = Self::under(tree, MortonCode(0), 0);
         // Skips everything before the voxel during the descent.

@@ -29,8 +29,9 @@ impl Octree {
         };
         let all_replaced = overrides.len() as u64 == MortonCode::span(depth);
         match node.value() {
-            // The remaining voxels do not exceed the node's old value.
+            // The maximum may be in a voxel without an override.
             Some(value) if !all_replaced && highest < value => {}
+            // Voxels without an override do not exceed the node's value.
             _ => return Some(highest),
         }
         let Node::Inner { block, .. } = node else { return node.value() };

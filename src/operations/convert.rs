@@ -8,9 +8,9 @@ use std::path::Path;
 /// Copies a map to a new one with another or the same storage, in `folder`, which must be missing or empty. The content
 /// is identical bit by bit. Memory: one tile, and about 200 bytes per tile.
 ///
-/// The copy keeps the map's id, its number of scans and that of each tile, and the inputs. So a build can be resumed on
-/// either, and a merge of both reports their relation. Flush numbers restart, and snapshots are not copied. A map of
-/// the original format gets an id. `progress` receives the number of tiles done and in total.
+/// The copy keeps the map's id, its inputs, and the scan numbers of the map and of each tile. A build can therefore be
+/// resumed on either map, and a merge of both reports that they are related. Flush numbers restart, and snapshots are
+/// not copied. A map of the original format gets an id. `progress` receives the number of tiles done and in total.
 ///
 /// # Errors
 ///

@@ -10,9 +10,9 @@ use std::sync::Arc;
 
 /// Creates a map of the voxels of another map in a part of space.
 ///
-/// The new map has the parameters, storage and number of scans of the other, but its own id and no inputs to resume,
-/// because it lacks a part of the scans. It appears only when it is complete, see [`MapWriter`]. `progress` receives
-/// the number of tiles done and in total.
+/// The new map has the parameters, storage and number of scans of the original map. It has its own id, and no inputs: a
+/// build cannot be resumed on it, because it lacks a part of the scans. It appears only when it is complete, see
+/// [`MapWriter`]. `progress` receives the number of tiles done and in total.
 ///
 /// # Errors
 ///
@@ -27,7 +27,7 @@ pub fn crop(
 }
 
 /// Like [`crop`], for a shard of a future map with the id `map_id` ([`move_shard`](super::move_shard())). The shard is
-/// not durable before that: after a crash it must be created again.
+/// durable only after [`move_shard`](super::move_shard()): after a crash before that, create it again.
 ///
 /// # Errors
 ///
@@ -70,7 +70,7 @@ fn crop_to(
     writer.finish()
 }
 
-/// Returns the metadata of the whole map, without its identity and inputs.
+/// Returns the metadata of a part of a map: those of the whole map, but with the id `map_id` and without inputs.
 fn metadata_of_part(map: &MapReader, map_id: [u8; 16]) -> Metadata {
     let mut metadata = new_metadata(map.config(), map_id, &[]);
     if let (Some(ext), Some(whole)) = (&mut metadata.ext, &map.metadata().ext) {

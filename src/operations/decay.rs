@@ -27,7 +27,7 @@ pub struct Decay {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 #[non_exhaustive]
 pub struct Decayed {
-    /// Number of scans of the decay.
+    /// Number of scans that the factor was computed from.
     pub scans: u64,
     /// Factor by which log-odds were multiplied.
     pub factor: f64,
@@ -88,8 +88,8 @@ impl Decay {
     }
 }
 
-/// Applies a decay to a map, in place and in one commit. The map records the last decay, so a repeated call changes
-/// nothing, unless the rule has a number of scans.
+/// Applies a decay to a map, in place and in one commit. The map records the last decay. Without new scans, a repeated
+/// call changes nothing, except if [`Decay::scans`] is set.
 ///
 /// `progress` receives the number of tiles done and in total.
 ///

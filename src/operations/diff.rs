@@ -7,7 +7,7 @@ use crate::space::TileIndex;
 use crate::tile::Table;
 use serde::Serialize;
 
-/// Difference from a first map, or state of a map, to a second one.
+/// Difference between two maps, or between two states of one map.
 ///
 /// *Flipped* voxels changed from free to occupied or back, each by its own map's threshold. *Changed* voxels differ
 /// only in log-odds or count.

@@ -10,15 +10,15 @@ use std::path::Path;
 /// with that id.
 ///
 /// The result equals that of [`merge`](super::merge()), but no tile is read: the files get hard links in the map, or
-/// are copied if the file system has none. Shards are opened one at a time and are unchanged. So a killed attempt can
-/// be repeated, which removes its remains. The shards must not have a writer. Removing them does not affect the map.
-/// The map is created on the disk of the shards, and appears only when it is complete, see
+/// are copied if the file system has no hard links. Shards are opened one at a time and are unchanged. A killed call
+/// can be repeated; it first removes what the killed call has left. The shards must not have a writer. Removing them
+/// does not affect the map. The map is created on the disk of the shards, and appears only when it is complete, see
 /// [`MapWriter`](super::MapWriter). `progress` receives the number of tiles done and in total.
 ///
 /// # Errors
 ///
-/// No shard, shards with other ids, parameters or storage, or with a common tile, a file that is missing or of another
-/// length than in the log of its shard, an output with other content, or an I/O error.
+/// No shard, shards with different ids, parameters or storage, or with a common tile, a file that is missing or of
+/// another length than in the log of its shard, an output with other content, or an I/O error.
 pub fn join(
     shards: &[MapPath],
     output: impl AsRef<Path>,

@@ -19,8 +19,8 @@ pub struct KeptBytes {
     pub snapshot_bytes: u64,
 }
 
-/// Counts the replaced tables in `folder` that are kept. Lists the folder of every tile. Takes no lock, so next to a
-/// writer the numbers can be inconsistent.
+/// Counts the replaced tables in `folder` that are kept. Lists the folder of every tile. Takes no lock, so the numbers
+/// can be inconsistent while a writer is active.
 ///
 /// # Errors
 ///
@@ -41,7 +41,7 @@ pub fn kept_bytes(folder: impl Into<MapPath>) -> Result<KeptBytes> {
     let mut counts = KeptBytes::default();
     for (tile, flush_number) in kept.iter().flat_map(|(tile, flushes)| flushes.iter().map(|n| (*tile, *n))) {
         let path = store.layout().kept(tile, flush_number);
-        // Removed after it was listed, or unreadable.
+        // Skip a table that was removed after it was listed, or that cannot be read.
         let Ok(Some(EntryKind::File(bytes))) = disk.kind(&path) else { continue };
         let (tables, all_bytes) = match seen.contains(&(tile, flush_number)) {
             true => (&mut counts.snapshot_tables, &mut counts.snapshot_bytes),

@@ -22,8 +22,8 @@ pub(super) struct MapEditor {
     is_written_to: bool,
 }
 
-/// Opens a map for writing and calls `change`. After an error the uncommitted files are removed. After a crash the next
-/// opening of the map does that.
+/// Opens a map for writing and calls `change`. After an error the uncommitted files are removed. After a crash they are
+/// removed when the map is next opened for writing.
 pub(super) fn edit<T>(
     disk: Arc<dyn Disk>,
     folder: &Path,
@@ -104,7 +104,7 @@ impl MapEditor {
         self.store.remove(tile)
     }
 
-    /// Commits all changes, and those of `note` to the metadata. `what` is the name of the operation.
+    /// Commits all changes, including those that `note` makes to the metadata. `what` is the name of the operation.
     pub(super) fn commit(&mut self, what: &str, note: impl FnOnce(&mut Extension)) -> Result<()> {
         self.begin_writing()?;
         self.store.archive_mut().note(CatalogEntry::Operation(what.to_owned()));

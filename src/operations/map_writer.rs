@@ -12,8 +12,8 @@ use std::sync::Arc;
 /// Writer of a new map from the tables of its tiles, one at a time. Memory: one table, and about 200 bytes per tile.
 ///
 /// Until [`MapWriter::finish`] the map is in `MAP.unfinished`, next to its final path, so no command opens an
-/// incomplete map. Dropping the writer removes that folder. If the process is killed, the next attempt to create the
-/// map does.
+/// incomplete map. Dropping the writer removes that folder. If the process is killed, the folder is removed by the next
+/// attempt to create the map.
 #[derive(Debug)]
 pub struct MapWriter {
     map: StagedMap,
@@ -72,7 +72,7 @@ impl MapWriter {
     }
 
     /// Begins a map with the parameters, id, number of scans and inputs in `metadata`. Tiles, bounds and flush numbers
-    /// are its own.
+    /// in `metadata` are ignored.
     ///
     /// # Errors
     ///
@@ -196,7 +196,8 @@ impl MapWriter {
     ///
     /// # Errors
     ///
-    /// An I/O error. There is no map then, unless only the last step, the sync of its name, has failed.
+    /// An I/O error. There is no map then. The exception is a failure of the last step, the sync of the folder that
+    /// contains the map.
     pub fn finish(mut self) -> Result<WrittenMap> {
         self.commit()?;
         // Finish the commit now, so that the map has no remaining work when it becomes visible.

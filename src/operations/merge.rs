@@ -34,10 +34,10 @@ pub struct Merged {
 /// decides.
 ///
 /// Without `prefer`, log-odds are added in the order of the maps and clamped once, and counts are added. The result is
-/// that of one map of all scans, apart from intermediate clamping and the order of additions. It requires maps with the
-/// model [`LogOdds`](crate::sensor::LogOdds) and equal parameters, because evidence of the other model depends on
-/// earlier evidence, unless no tile is in two maps. With `prefer` the sensor models may differ. Sensor model, occupancy
-/// threshold and storage are those of the first map.
+/// that of one map of all scans, apart from intermediate clamping and the order of additions. This requires equal
+/// parameters, and the model [`LogOdds`](crate::sensor::LogOdds) without guarded clearing: otherwise an update depends
+/// on earlier evidence in the same map. Maps without a common tile need neither this nor `prefer`. With `prefer` the
+/// sensor models may differ. Sensor model, occupancy threshold and storage are those of the first map.
 ///
 /// The new map has its own id and no scans, unless the maps are regions of one build
 /// ([`RayConfig::region`](crate::RayConfig)) that together form a box: then the result equals one build of that box,
@@ -175,8 +175,8 @@ fn put_merged(
     }
 }
 
-/// Returns whether the rule does not change voxels that only this table has. Only maps of other programs contain
-/// log-odds beyond the limits.
+/// Returns whether the rule leaves a table unchanged if no other map has its tile. `Add` clamps log-odds beyond the
+/// limits, which only maps of other programs contain.
 fn is_left_alone(table: &Table, rule: MergeRule) -> bool {
     match rule {
         MergeRule::Take(_) => true,

@@ -26,7 +26,8 @@ impl MergeRule {
     pub(super) fn of(config: &MapConfig, prefer: Option<Prefer>) -> Option<Self> {
         match (prefer, config.sensor_model) {
             (Some(prefer), _) => Some(Self::Take(prefer)),
-            // Whether a miss counts depends on earlier scans of the same map.
+            // With guarded clearing, evidence cannot be added: whether a miss counts depends on earlier scans of the
+            // same map.
             (None, _) if config.rays.clearing().guard().is_some() => None,
             (None, SensorModel::LogOdds(LogOdds { min, max, .. })) => Some(Self::Add { min, max }),
             (None, _) => None,

@@ -56,7 +56,8 @@ impl Regions {
     pub(super) fn add(&mut self, map: &MapReader) -> Result<()> {
         let Some((ext, list)) = &self.scans else { return Ok(()) };
         let are_same = map.metadata().ext.as_ref().is_some_and(|other| are_same_scans(other, ext));
-        // The lists differ if scans were removed from one of the maps.
+        // The scans of the inputs may be the same, but the lists still differ if scans were removed from one of the
+        // maps.
         match own_region(map).filter(|_| are_same) {
             Some(region) if map.scans()? == *list => self.regions.push(region),
             _ => self.scans = None,
@@ -77,7 +78,7 @@ fn own_region(map: &MapReader) -> Option<TileBox> {
     map.tile_indices().into_iter().all(|tile| region.contains(tile)).then_some(region)
 }
 
-/// Returns whether the inputs and poses of all scans are known. They are not after a remap.
+/// Returns whether the inputs and poses of all scans are known. False after a remap.
 fn are_known(scans: &Extension) -> bool {
     let is_known = |content: &InputContent| !content.pose_chain.is_empty();
     scans.inputs.iter().all(|input| input.content.as_ref().is_some_and(is_known))

@@ -57,7 +57,7 @@ pub fn replace_tiles(
         return Err(Error::argument("parts", "two parts have the same tile; crop disjoint regions"));
     }
     edit(disk, map, |editor| {
-        // The map is locked, so this includes all earlier flushes.
+        // The map is locked, so no other process can flush it after this check.
         let flush_number = editor.flush_number();
         if flush_number != of_flush {
             let reason = format!(
@@ -88,7 +88,8 @@ pub fn replace_tiles(
     })
 }
 
-/// Writes a tile if it has changed. For an equal tile, readers and snapshots need no copy.
+/// Writes a tile if it has changed. An equal tile is not written: its old version would have to be kept for readers and
+/// snapshots.
 fn replace_tile(
     editor: &mut MapEditor,
     tile: TileIndex,

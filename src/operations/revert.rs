@@ -25,8 +25,8 @@ pub struct Reverted {
     pub tiles_restored: u64,
     /// Number of tiles that were added since the snapshot and removed.
     pub tiles_removed: u64,
-    /// Whether nothing was done, because the map already equalled the snapshot and the name `keep_as` was taken: an
-    /// earlier call has done it, or nothing has changed since.
+    /// Whether nothing was done, because the map already equalled the snapshot and a snapshot `keep_as` existed. Either
+    /// an earlier call has reverted the map, or the map has not changed since the snapshot.
     pub was_done: bool,
 }
 
@@ -83,7 +83,7 @@ pub fn revert(
         log::warn!("{}: unneeded kept scans remain: {error:#}", folder.display());
     }
     drop(store);
-    // Removes uncommitted files.
+    // Opening the map removes the uncommitted files.
     if outcome.is_err()
         && let Err(error) = TileStore::open(disk, folder)
     {
@@ -152,7 +152,7 @@ fn check_kept_scans(store: &TileStore, past: &TileStore) -> Result<()> {
         {
             match some.next_kept() {
                 Ok(Some(known)) => next_own = Some(known),
-                // The revert drops the damaged part of the map's own catalog.
+                // An error is ignored: the revert replaces the damaged part of the map's catalog.
                 Ok(None) | Err(_) => own = None,
             }
         }
@@ -180,7 +180,8 @@ impl<'a> Reverter<'a> {
         Ok(Self { store, past, config, saver })
     }
 
-    /// Makes the snapshot's version of a tile the next one. Returns false if it is the current one.
+    /// Restores the snapshot's version of a tile with the next commit. Returns `false` if the map already has this
+    /// version.
     fn restore(&mut self, tile: TileIndex) -> Result<bool> {
         let Some(version) = self
             .past
@@ -206,7 +207,7 @@ impl<'a> Reverter<'a> {
         Ok(true)
     }
 
-    /// Builds the octree, and returns whether it is the one that the snapshot's table names.
+    /// Builds the octree, and returns whether its version is that of the snapshot.
     fn has_octree_of(
         &mut self,
         tile: TileIndex,

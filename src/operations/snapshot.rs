@@ -26,8 +26,8 @@ pub struct SnapshotInfo {
     pub voxels: u64,
     /// Bytes of its tables.
     pub table_bytes: u64,
-    /// Bytes of tables that only this snapshot uses: upper bound of the disk space freed by its deletion. It is less if
-    /// a revert has linked a table.
+    /// Bytes of tables that only this snapshot uses: upper bound of the disk space freed by its deletion. Less is freed
+    /// if a revert has made the map use such a table again, by a hard link.
     pub own_bytes: u64,
     /// Error if the snapshot is unreadable; all numbers are 0 then.
     pub damage: Option<String>,
@@ -63,8 +63,8 @@ pub fn delete_snapshot(folder: impl Into<MapPath>, name: &SnapshotName) -> Resul
     TileStore::open(disk, folder)?.snapshot_writer().delete(name)
 }
 
-/// Lists the snapshots of a map, by flush and then by name, unreadable ones first. Takes no lock, so next to a writer
-/// the numbers of bytes can be inconsistent.
+/// Lists the snapshots of a map, by flush and then by name, unreadable ones first. Takes no lock, so the numbers of
+/// bytes can be inconsistent while a writer is active.
 ///
 /// # Errors
 ///
@@ -83,7 +83,7 @@ pub fn snapshots(folder: impl Into<MapPath>) -> Result<Vec<SnapshotInfo>> {
             Err(error @ (Error::Damaged { .. } | Error::Io { .. })) => {
                 infos.push(SnapshotInfo::damaged(&name, &error));
             }
-            // Deleted after they were listed.
+            // The snapshot was deleted after it was listed.
             Err(Error::InvalidArgument { .. }) => {}
             Err(error) => return Err(error),
         }
@@ -97,7 +97,8 @@ pub fn snapshots(folder: impl Into<MapPath>) -> Result<Vec<SnapshotInfo>> {
     Ok(infos)
 }
 
-/// Returns the information of a new snapshot. Assumes that the map is unchanged since, and ignores other snapshots.
+/// Returns the information of a snapshot that was just created. Unlike [`snapshots`], this counts no tables for
+/// [`SnapshotInfo::own_bytes`]: the map still has all of them.
 ///
 /// # Errors
 ///
@@ -108,11 +109,11 @@ pub fn new_snapshot(folder: impl Into<MapPath>, name: &SnapshotName) -> Result<S
     Ok(SnapshotInfo::of(&store.snapshots().read(name)?))
 }
 
-/// Snapshots that use each kept table.
+/// For each kept table, the snapshots that use it.
 #[derive(Default)]
 struct Owners {
     owners: FxHashMap<(TileIndex, u64), Owner>,
-    /// Flushes as of which tables of a tile are kept. A cache, because snapshots have many tiles in common.
+    /// For each tile, the flush numbers of its kept tables. A cache, because most snapshots have the same tiles.
     kept: FxHashMap<TileIndex, BTreeSet<u64>>,
 }
 

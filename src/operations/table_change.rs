@@ -5,7 +5,7 @@ use crate::sensor::Evidence;
 use crate::space::{BRICK_EDGE, BrickMask, VoxelBox, VoxelIndex, mask_of_box};
 use crate::tile::Table;
 
-/// Returns the table of the voxels in a part of space. `tile` contains the voxels of the tile.
+/// Returns the table of the voxels in a part of space. `tile` is the box of the tile's voxels.
 pub(super) fn voxels_of_part(table: &Table, tile: &VoxelBox, part: &VoxelPart) -> Table {
     let mut kept = Table::default();
     let mut run = Vec::new();

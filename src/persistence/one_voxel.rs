@@ -21,7 +21,8 @@ const SMALL_FILE_BYTES: u64 = 64 << 10;
 const FIRST_BYTES: usize = 8 << 10;
 
 /// Reads one voxel from the part of its tile's file that contains it, and compares that part with the log. Returns
-/// `None` if the file has no parts, or after any error: loading the tile reports it.
+/// `None` if the file cannot be read in parts, or after any error: the caller then loads the tile, which reports the
+/// error.
 pub(crate) fn read_voxel(store: &TileStore, grid: &Grid, voxel: VoxelIndex) -> Option<FoundVoxel> {
     let tile = grid.tile_of_voxel(voxel);
     let location = store.tables().location_to_read(tile).ok()??;

@@ -4,7 +4,7 @@ use crate::space::TileIndex;
 use crate::tile::Voxel;
 use rayon::prelude::*;
 
-/// Maximum number of voxels of tiles that are read together, unless a single tile has more: 8 MB.
+/// Maximum number of voxels of tiles that are read together: 8 MB. A tile with more voxels is read alone.
 const MAX_VOXELS: u64 = 1 << 18;
 /// Maximum number of tiles that are read together.
 const MAX_TILES: usize = 64;

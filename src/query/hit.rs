@@ -24,7 +24,7 @@ impl Hit {
         Self { voxel, center_m, distance_m, probability }
     }
 
-    /// Returns whether this voxel is closer than another; of equally close ones, the lower index is.
+    /// Returns whether this voxel is nearer than another. At equal distances, the lower index counts as nearer.
     pub(crate) fn is_nearer_than(&self, other: Option<&Self>) -> bool {
         other.is_none_or(|other| (self.distance_m, self.voxel) < (other.distance_m, other.voxel))
     }

@@ -11,7 +11,7 @@
 //! | a point at a coarse depth | the same, for the largest log-odds under that octree node |
 //! | a region, the whole map | its voxels, streamed |
 //! | a region from above | [`Columns`]: unknown, free or occupied, for each column of voxels |
-//! | a ray, many rays, a segment | [`Hit`]: the first occupied voxel, identical to that of single steps |
+//! | a ray, many rays, a segment | [`Hit`]: the first occupied voxel, as if every voxel on the ray were examined |
 //! | a sphere, a box, a swept sphere | [`Hit`]: an occupied voxel that it touches |
 //! | nearest occupied | [`Hit`]: the occupied voxel with the nearest center |
 //! | digest | a hash of the whole content |

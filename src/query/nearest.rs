@@ -31,7 +31,7 @@ pub(super) fn nearest_occupied<V: MapView + ?Sized>(
     nearest_in_ball(view, point, max_distance_m, &mut all_tiles)
 }
 
-/// Returns a distance within which all voxels of a box of tiles are.
+/// Returns an upper bound of the distance between a point and the voxels in a box of tiles.
 fn distance_to_farthest_m(grid: &Grid, tiles: &TileBox, point: Point) -> f64 {
     let [low, high] = [grid.voxels_of_tile(tiles.min()).min, grid.voxels_of_tile(tiles.max()).end];
     // A margin of one voxel for rounding.
@@ -112,7 +112,7 @@ fn bricks_around(tile: &Tile, voxels: &VoxelBox) -> impl Iterator<Item = BrickPa
     let low = voxels.min.map(|k| k & !(BRICK_EDGE - 1));
     let along = move |k: usize| (low[k]..voxels.end[k]).step_by(BRICK_EDGE as usize);
     let edges: [usize; 3] = std::array::from_fn(|k| if voxels.is_empty() { 0 } else { along(k).count() });
-    // A large ball may have room for more bricks than the tile has.
+    // A large ball may cover more brick positions than the tile has bricks. Then list the bricks of the tile.
     let is_large = edges.iter().product::<usize>() > tile.table().brick_count();
     let listed =
         is_large.then(|| tile.table().bricks().filter_map(|brick| tile.voxels_of_brick(brick).next()));

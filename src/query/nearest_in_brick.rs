@@ -56,7 +56,7 @@ impl Nearest {
             let [low, high] = [OCTANT_EDGE - 1, OCTANT_EDGE].map(|k| squares[axis][k]);
             octant | usize::from(high < low) << axis
         });
-        // First octants that share a face with it, then an edge, then a corner.
+        // The nearest octant first, then those that share a face with it, an edge, and a corner.
         for away in [0, 1, 2, 4, 3, 5, 6, 7] {
             let octant: usize = next_to_point ^ away;
             let first: [usize; 3] = std::array::from_fn(|axis| (octant >> axis & 1) * OCTANT_EDGE);

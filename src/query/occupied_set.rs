@@ -61,7 +61,8 @@ fn hull_of(set: &impl OccupiedSet) -> (Option<VoxelBox>, usize) {
     (hull, count)
 }
 
-/// Returns the step function of a ray through a set with a number of cells.
+/// Returns the function by which [`walk_ray`] examines the next voxels of a ray. `cells` is the number of cells of the
+/// set.
 fn meet(
     set: &impl OccupiedSet,
     unknown: UnknownAs,
@@ -118,7 +119,7 @@ pub fn cast_ray(set: &impl OccupiedSet, query: &RayQuery) -> Result<Option<Hit>>
 ///
 /// Fails if the segment is not finite or too long.
 pub fn cast_segment(set: &impl OccupiedSet, ends: [Point; 2], unknown: UnknownAs) -> Result<Option<Hit>> {
-    // A segment crosses at most a million voxels.
+    // Never scan all cells: a segment crosses at most a million voxels.
     walk_segment(&set.grid_of_set(), ends, meet(set, unknown, usize::MAX))
 }
 
@@ -151,7 +152,7 @@ pub fn nearest_occupied(set: &impl OccupiedSet, point: Point, max_distance_m: f6
     super::nearest::check(point, max_distance_m)?;
     let grid = set.grid_of_set();
     let (Some(hull), _) = hull_of(set) else { return Ok(None) };
-    // All are in a ball around the point that reaches the corners of the hull.
+    // All voxels are in a ball around the point that reaches the corners of the hull.
     let farthest_m = (0..3)
         .map(|k| [hull.min[k], hull.end[k]].map(|index| (grid.corner_m(index) - point[k]).abs()))
         .map(|[low, high]| low.max(high).powi(2))

@@ -71,7 +71,8 @@ impl OctreeShift {
         }
     }
 
-    /// Keys repeat every 65536 voxels; differences of keys are unaffected.
+    /// Converts a code of the map to one of the octree. Keys repeat every 65536 voxels, which does not affect their
+    /// differences.
     fn of_key(&self, code: MortonCode) -> MortonCode {
         let VoxelKey(key) = code.to_key();
         VoxelKey(std::array::from_fn(|axis| key[axis].wrapping_sub(self.origin[axis] as u16))).morton()

@@ -21,7 +21,7 @@ impl PointsByTile {
         const NOWHERE: u16 = u16::MAX;
         let mut places: FxHashMap<TileIndex, u16> = FxHashMap::default();
         let mut tiles: Vec<(TileIndex, u32)> = Vec::new();
-        // Neighbours in a list are mostly neighbours in space.
+        // Consecutive points are mostly in the same tile.
         let mut last: Option<(TileIndex, u16)> = None;
         let (mut is_in_order, mut before) = (true, 0);
         let place_of_point = |&point: &Point| {

@@ -56,8 +56,8 @@ pub trait Queries: Sync {
     /// first voxel is requested. Local maps and layers return only occupied voxels.
     fn voxels_in(&self, region: &Aabb) -> Voxels<'_>;
 
-    /// Returns the first occupied voxel on a ray (or the first unknown one, if unknown space is an obstacle), identical
-    /// to that of single steps; `None` if the ray ends first.
+    /// Returns the first occupied voxel on a ray (or the first unknown one, if unknown space is an obstacle); `None` if
+    /// the ray ends first. The result is the same as if every voxel on the ray were examined.
     ///
     /// # Errors
     ///

@@ -31,7 +31,7 @@ pub struct RayQuery {
     pub unknown: UnknownAs,
 }
 
-/// Result of a step of a ray.
+/// Result of examining the next voxels of a ray.
 pub(crate) enum Met {
     /// The voxel stops the ray; contains the probability of being occupied, `None` if unknown.
     Obstacle(Option<f64>),
@@ -45,7 +45,7 @@ pub(crate) enum Met {
     End,
 }
 
-/// Makes a step function that examines one voxel at a time.
+/// Returns a function for [`walk_ray`] that examines one voxel at a time.
 pub(crate) fn voxel_by_voxel(
     mut meet: impl FnMut(VoxelIndex) -> Result<Met>,
 ) -> impl FnMut(&mut RayWalk, f64) -> Result<Met> {
@@ -54,8 +54,8 @@ pub(crate) fn voxel_by_voxel(
 
 pub(crate) const EVERYWHERE: VoxelBox = VoxelBox { min: [i32::MIN; 3], end: [i32::MAX; 3] };
 
-/// Walks a ray until it is stopped. Everything outside the hull is unknown; an empty map has no hull. `meet` receives
-/// the walk and the end time, and may advance the walk.
+/// Walks a ray until a voxel stops it. All voxels outside of `hull` are unknown; an empty map has no hull. `meet`
+/// examines the next voxels: it receives the walk and the range in metres, and may advance the walk.
 ///
 /// # Errors
 ///
@@ -115,7 +115,7 @@ pub(crate) fn walk_ray(
     Ok(None)
 }
 
-/// Walks from one point to another, including both ends, until it is stopped.
+/// Walks from one point to another, including both ends, until a voxel stops the walk. `meet` is as for [`walk_ray`].
 ///
 /// # Errors
 ///
@@ -166,7 +166,7 @@ pub(super) fn cast_segment<V: MapView + ?Sized>(
     walk_segment(&view.config().grid, ends, meet_map(view, unknown))
 }
 
-/// Returns the step function of a ray through a map, which examines brick by brick.
+/// Returns a function for [`walk_ray`] that examines a map brick by brick.
 fn meet_map<V: MapView + ?Sized>(
     view: &V,
     unknown: UnknownAs,

@@ -114,7 +114,8 @@ pub(super) fn tiles_of_list_in<V: MapView + ?Sized>(
     all.iter().copied().filter(|&tile| tiles.contains(tile)).collect()
 }
 
-/// The existing or missing tiles that overlap a box of voxels within the bounds of the map.
+/// Returns the smallest box of tiles around a box of voxels, within the bounds of the map. Some of the tiles may be
+/// missing.
 fn tile_box_around<V: MapView + ?Sized>(view: &V, voxels: &VoxelBox) -> Option<TileBox> {
     if voxels.is_empty() {
         return None;
@@ -210,7 +211,7 @@ pub(super) fn bricks_in(tile: &Tile, voxels: &VoxelBox) -> impl Iterator<Item = 
 
 /// The voxels whose center may be in a box, and a few around them.
 pub fn voxels_around(grid: &Grid, region: &Aabb) -> VoxelBox {
-    // With a margin; voxel indices extend to the limits of the range.
+    // A margin of one or two voxels allows for rounding. Indices are limited to the range of `i32`.
     let to_index =
         |coordinate: f64| coordinate.floor().clamp(f64::from(i32::MIN + 1), f64::from(i32::MAX - 2)) as i32;
     VoxelBox {

@@ -149,7 +149,8 @@ fn distance_squared_to_segment(bounds: &Aabb, from: Point, to: Point) -> f64 {
     pieces.sort_unstable_by(f64::total_cmp);
     let at = |time: f64| bounds.distance_squared(std::array::from_fn(|k| from[k] + time * along[k]));
     let min_between = |begin: f64, end: f64| {
-        // Outside of the same faces along the whole piece: the sum of (offset + time * along)^2 over those coordinates.
+        // The segment is outside of the same faces along the whole piece. The squared distance is the sum of (offset +
+        // time * along)^2 over the coordinates of these faces.
         let middle = 0.5 * (begin + end);
         let (mut slope, mut square) = (0.0, 0.0);
         for k in 0..3 {

@@ -4,11 +4,11 @@ use crate::mapper::{MapView, TileRef};
 use crate::space::{BrickCode, TileIndex, VoxelBox, VoxelIndex};
 use crate::tile::{BrickView, Tile};
 
-/// Keeps the last tile, so that neighbouring voxels load it once.
+/// Looks up tiles and keeps the last one, so that consecutive voxels of one tile load it once.
 pub(super) struct TileCursor<'a, V: ?Sized> {
     view: &'a V,
     tile: Option<CurrentTile<'a>>,
-    /// Number of absent tiles that are passed one by one before the empty space around one is looked up.
+    /// Number of absent tiles that are still looked up one by one, before the empty space around one is determined.
     one_by_one: u32,
 }
 

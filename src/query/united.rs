@@ -71,7 +71,7 @@ impl<'a> United<'a> {
         Ok(best)
     }
 
-    /// Step function of a ray if unknown space is an obstacle.
+    /// Returns a function that examines one voxel of a ray, if unknown space is an obstacle.
     fn meet(&self) -> impl FnMut(VoxelIndex) -> Result<Met> {
         |voxel| {
             Ok(match self.occupancy(voxel)? {

@@ -198,7 +198,7 @@ fn concurrent_scans_give_the_same_updates_and_large_ones_are_rejected() {
                     );
                 }
             }
-            // No collector is lost or created twice.
+            // All collectors were returned, and no more than needed were created.
             assert!(tracer.collectors() <= threads.max(scans.len()));
         }
     }
@@ -212,7 +212,7 @@ fn long_rays_respect_the_memory_limit() {
         let mut tracer = ScanTracer::with_memory_bytes(bytes);
         let (by_voxel, report, times) = setting.in_parts(&mut tracer, &scan, bytes / 16).unwrap();
         assert!(times > 0);
-        // The memory kept between scans; page numbers and marked prefixes take slightly more than 1 MiB.
+        // The memory kept between scans is also limited. Page numbers and marked prefixes add slightly more than 1 MiB.
         assert!(tracer.bytes() < bytes + (2 << 20), "{}", tracer.bytes());
         assert!((by_voxel, report) == setting.whole(&scan));
     }

@@ -29,7 +29,7 @@ pub struct Iwlo {
     pub free: f64,
     /// Steepness of the weight over the intensity; at 0.1 the intensity has almost no effect.
     pub sharpness: f64,
-    /// Rate at which a voxel's updates lose weight with their number, per update.
+    /// Rate at which updates of a voxel lose weight with the number of earlier updates.
     pub decay_rate: f64,
     /// Minimum weight of an update by age, in [0, 1].
     pub min_alpha: f64,

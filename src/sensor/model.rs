@@ -96,8 +96,8 @@ impl SensorModel {
         }
     }
 
-    /// Largest log-odds that a miss can lead to, unless they were larger before: those of a first miss, or the lower
-    /// clamp.
+    /// Upper bound of the log-odds after a miss: those of a first miss, or the lower clamp if it is larger. It does not
+    /// apply to a voxel whose log-odds were above it before the miss.
     pub(crate) fn max_after_miss(&self) -> f64 {
         let min = match self {
             Self::LogOdds(model) => model.min,

@@ -1,7 +1,7 @@
 use crate::maths::sigmoid;
 
-/// Computes [`Evidence::probability`](super::Evidence::probability) for many voxels with a cache. A few log-odds are
-/// common, and computing a probability takes as long as finding its voxel.
+/// Computes [`Evidence::probability`](super::Evidence::probability) for many voxels with a cache. Most voxels have one
+/// of a few log-odds values, and computing a probability takes as long as finding its voxel.
 #[derive(Clone, Debug)]
 pub struct Probabilities {
     /// Log-odds bits and probability, indexed by a hash of the log-odds.
@@ -26,7 +26,7 @@ impl Probabilities {
 
 impl Default for Probabilities {
     fn default() -> Self {
-        // All entries are valid.
+        // All entries are valid, so that `of` need not check for empty ones.
         Self { kept: vec![(f64::NAN.to_bits(), sigmoid(f64::NAN)); 1 << KEPT_BITS] }
     }
 }
@@ -38,7 +38,7 @@ mod tests {
     #[test]
     fn cached_values_equal_computed_ones() {
         let mut probabilities = Probabilities::default();
-        // More values than fit in the cache, each several times.
+        // The 1009 values do not fit in the cache, and each occurs several times.
         for number in 0..20_000_u32 {
             let log_odds = f64::from(number * 7919 % 1009) * 0.01 - 5.0;
             assert_eq!(probabilities.of(log_odds), sigmoid(log_odds));

@@ -18,7 +18,7 @@ pub struct Grid {
     inv_resolution: f64,
     tile_size_m: f64,
     voxels_per_tile_edge: i32,
-    /// In units of 2^-63.
+    /// Inverse of `voxels_per_tile_edge`, in units of 2^-63.
     tiles_per_voxel: i64,
 }
 
@@ -107,7 +107,7 @@ impl Grid {
         self.voxels_per_tile_edge
     }
 
-    /// Number of tiles along an axis that a distance in voxels can cross.
+    /// Maximum number of tile borders that a distance in voxels crosses along an axis.
     pub(crate) fn tiles_within(&self, voxels: i32) -> i32 {
         (voxels + self.voxels_per_tile_edge - 1) / self.voxels_per_tile_edge
     }
@@ -127,7 +127,7 @@ impl Grid {
     /// The voxel of a point in units of voxels; `None` as for [`Grid::voxel_of`].
     #[inline]
     pub fn voxel_of_units(point: Point) -> Option<VoxelIndex> {
-        // Also false for NaN.
+        // NaN is not in the range either.
         let is_in_range = |x: f64| x >= f64::from(i32::MIN) && x < f64::from(i32::MAX);
         point.iter().all(|&x| is_in_range(x)).then(|| point.map(floor))
     }
@@ -201,7 +201,7 @@ fn floor(number: f64) -> i32 {
     const ROUND: f64 = 1.5 * (1_u64 << 52) as f64;
     let rounded = number + ROUND;
     let nearest = rounded.to_bits() as i32;
-    // A number that rounds up out of the range wraps back.
+    // If rounding up exceeds the range of `i32`, the subtraction wraps back into it.
     nearest.wrapping_sub(i32::from(rounded - ROUND > number))
 }
 

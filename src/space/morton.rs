@@ -22,12 +22,13 @@ impl MortonCode {
         VoxelKey([gather(self.0), gather(self.0 >> 1), gather(self.0 >> 2)])
     }
 
-    /// Index (0 to 7) of the child of its ancestor at `depth` (0, the root, to 15) that contains this voxel.
+    /// Returns which child (0 to 7) of the voxel's ancestor at `depth` contains the voxel. `depth` is 0 (the root) to
+    /// 15.
     pub const fn child_at(self, depth: u8) -> usize {
         ((self.0 >> (45 - 3 * depth as u32)) & 7) as usize
     }
 
-    /// First code under this voxel's ancestor at `depth` (0, the root, to 16, the voxel itself).
+    /// Returns the smallest code in the voxel's ancestor at `depth`, which is 0 (the root) to 16 (the voxel itself).
     pub const fn ancestor(self, depth: u8) -> Self {
         Self(self.0 & !(Self::span(depth) - 1))
     }
@@ -63,7 +64,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_papers_example_is_167() {
+    fn the_code_of_key_1_5_3_is_167() {
         assert_eq!(MortonCode::from_key(VoxelKey([1, 5, 3])), MortonCode(167));
     }
 

@@ -28,7 +28,7 @@ impl TryFrom<Corners> for TileBox {
     }
 }
 
-/// Maximum number of tiles ahead of a box; no vehicle has scans that span more.
+/// Maximum number of tiles that [`TileBox::ahead`] returns. The scans of a vehicle never span more.
 const MAX_AHEAD: usize = 4096;
 
 impl TileBox {
@@ -37,10 +37,10 @@ impl TileBox {
         Self { min: min.to_array(), max: max.to_array() }
     }
 
-    /// The tiles whose center is in a box; `None` if there are none. Thus boxes that partition space yield boxes of
-    /// tiles that do. Bounds of the box may be infinite.
+    /// The tiles whose center is in a box; `None` if there are none. If several boxes partition space, their boxes of
+    /// tiles partition the tiles. Bounds of the box may be infinite.
     pub fn with_centers_in(region: &Aabb, grid: &Grid) -> Option<Self> {
-        // Saturates, because no voxel is in the last tiles of the range.
+        // The conversion to `i32` saturates. No voxel is in the last tiles of the range, so this is correct.
         let first_from = |bound_m: f64| (bound_m / grid.tile_size_m() - 0.5).ceil() as i32;
         let (min, end) = (region.min.map(first_from), region.max.map(first_from));
         let is_empty = (0..3).any(|k| min[k] >= end[k]);

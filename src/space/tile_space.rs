@@ -5,12 +5,14 @@ use rustc_hash::FxHashSet;
 /// an edge that may contain one. A ray passes a cube without tiles in one step, so its cost depends on the number of
 /// tiles near it, not on the distance between them.
 ///
-/// Tiles are added and never removed. A level with too many cubes is disabled: fine levels of a large map, which then
-/// takes 200 kB, and coarse ones if tens of thousands of tiles are more than 40 km apart (10 MB).
+/// Tiles are added and never removed. A level with too many cubes is disabled, which limits the memory to 200 kB. In
+/// large maps this concerns the fine levels. If tens of thousands of tiles are more than 40 km apart, coarse levels are
+/// disabled too, and the limit is 10 MB.
 #[derive(Clone, Debug, Default)]
 pub struct TileSpace {
     bounds: Option<TileBox>,
-    /// From fine to coarse. A cube that may contain a tile is in one of the next level that may, too.
+    /// From fine to coarse. If a cube is in a level, the larger cube around it is in the next level, or the next level
+    /// is disabled.
     levels: [Level; SHIFTS.len()],
 }
 
@@ -39,7 +41,7 @@ impl TileSpace {
                 continue;
             }
             if !level.cubes.insert(cube_of(tile, shift)) {
-                // Coarser levels already contain its cubes.
+                // A cube in this level implies its cubes in all coarser levels, so nothing is to be added there.
                 return;
             }
             if level.cubes.len() > max_cubes {

@@ -4,8 +4,8 @@ use rustc_hash::FxHashMap;
 use std::fmt;
 use std::iter::Peekable;
 
-/// Sorted map from tiles to values in little memory: all but recent changes are packed, in about twenty bytes for a
-/// tile's file checksums and five for its index alone.
+/// Sorted map from tiles to values in little memory: all entries except recent ones are packed. A tile takes about 20
+/// bytes with its file checksums as the value, and 5 bytes without a value.
 ///
 /// ```text
 /// recent  hash map: tile -> value, or a mark that the tile was removed from the blocks
@@ -39,7 +39,7 @@ struct Block {
 
 /// Maximum number of tiles in a block.
 const BLOCK_TILES: usize = 64;
-/// Number of recent tiles that is always allowed.
+/// Number of recent tiles that is allowed in a table of any size.
 const MIN_RECENT: usize = 1024;
 /// Divisor for the maximum share of recent tiles.
 const RECENT_PART: usize = 16;
@@ -154,7 +154,7 @@ impl<V: TileValue> TileTable<V> {
                     let merged =
                         Merged { packed: packed.peekable(), recent: changes.iter().copied().peekable() };
                     let merged: Vec<(TileIndex, V)> = merged.collect();
-                    // Of equal size, so that the next few tiles do not split them again.
+                    // The blocks get equal sizes, so that the next few tiles do not split them again.
                     let parts = merged.len().div_ceil(BLOCK_TILES).max(1);
                     blocks.extend(merged.chunks(merged.len().div_ceil(parts).max(1)).map(Block::of));
                 }

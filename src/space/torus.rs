@@ -9,8 +9,9 @@ use std::hint::select_unpredictable;
 /// cell that would need too large a torus is stored in a hash map.
 #[derive(Clone, Debug)]
 pub struct Torus {
-    /// Along each axis, the size minus one, and the position of its bits in the index of a slot.
+    /// Size of the torus minus one, for each axis.
     masks: [u32; 3],
+    /// Position of each axis's bits in the index of a slot.
     shifts: [u32; 3],
     slots: Vec<Slot>,
     far: FxHashMap<Cell, u32>,
@@ -31,8 +32,9 @@ impl Torus {
     /// Number of an absent cell; numbers start at 1.
     pub const NONE: u32 = 0;
 
-    /// Maximum number of slots: for any number of cells, and per cell.
+    /// Maximum number of slots for few cells.
     const MIN_SLOTS: usize = 64;
+    /// Maximum number of slots per cell, if this allows more than [`Self::MIN_SLOTS`].
     const MAX_SLOTS_A_CELL: usize = 16;
 
     /// Number of cells.
@@ -104,7 +106,7 @@ impl Torus {
         };
         let (axis, bits) = (0..3).filter_map(bits_along).min_by_key(|&(_, bits)| bits)?;
         let most = (Self::MAX_SLOTS_A_CELL * self.len).max(Self::MIN_SLOTS);
-        // In 128 bits no bit is lost: at most 32 bits are added.
+        // The shift cannot overflow in 128 bits, because `bits` is at most 32.
         ((self.slots.len() as u128) << bits <= most as u128).then_some((axis, bits))
     }
 
@@ -113,7 +115,7 @@ impl Torus {
         self.masks[axis] = ((self.masks[axis] + 1) << bits) - 1;
         self.shifts = shifts(self.masks);
         let slots = vec![EMPTY; self.slots.len() << bits];
-        // Separated cells remain separated.
+        // `put` succeeds, because cells with separate slots also have separate slots in a larger torus.
         for slot in std::mem::replace(&mut self.slots, slots) {
             if slot.number != Self::NONE {
                 self.put(slot.cell, slot.number);

@@ -111,7 +111,7 @@ impl TileStore {
             }
             let kept = self.tables().kept(tile)?;
             let Some(flush_number) = seen_by(Some(&kept), snapshot.commits.flush_number) else {
-                // The kept table existed when the tile was read: a writer removed it.
+                // The snapshot needs a kept table, so a writer has removed it since the snapshot was read.
                 return Err(Error::Changed { path: self.folder().to_owned() });
             };
             if seen_kept.insert(flush_number) {

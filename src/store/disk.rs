@@ -54,7 +54,7 @@ pub trait Disk: Debug + Send + Sync {
     fn exchange(&self, _: &Path, _: &Path) -> io::Result<()> {
         Err(io::ErrorKind::Unsupported.into())
     }
-    /// Creates a hard link with an unused name. Fails where the file system has no hard links.
+    /// Creates a hard link to a file, with an unused name. Fails where the file system has no hard links.
     fn link(&self, _: &Path, _: &Path) -> io::Result<()> {
         Err(io::ErrorKind::Unsupported.into())
     }
@@ -82,7 +82,7 @@ pub trait Disk: Debug + Send + Sync {
     fn newer(&self) -> io::Result<Option<Arc<dyn Disk>>> {
         Ok(None)
     }
-    /// Number of files worth announcing by [`Disk::read_ahead`] at a time; 0 if read-ahead does not help.
+    /// Maximum number of files to announce by [`Disk::read_ahead`] at a time; 0 if read-ahead does not help.
     fn files_ahead(&self) -> usize {
         0
     }

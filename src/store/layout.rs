@@ -74,32 +74,32 @@ impl Layout {
         &self.folder
     }
 
-    /// `metadata.json`.
+    /// Path of `metadata.json`.
     pub fn metadata(&self) -> PathBuf {
         self.folder.join("metadata.json")
     }
 
-    /// `commits.log`.
+    /// Path of `commits.log`.
     pub fn commit_log(&self) -> PathBuf {
         self.folder.join("commits.log")
     }
 
-    /// `scans.bin`.
+    /// Path of `scans.bin`, the list of scans.
     pub fn scans(&self) -> PathBuf {
         self.folder.join("scans.bin")
     }
 
-    /// Replacement of a damaged `scans.bin`, before it is renamed.
+    /// Path of the replacement of a damaged `scans.bin`, before it is renamed.
     pub(super) fn scans_next(&self) -> PathBuf {
         self.folder.join(SCANS_NEXT)
     }
 
-    /// The folder of kept scans.
+    /// Path of the folder of kept scans.
     pub fn kept_scans(&self) -> PathBuf {
         self.folder.join(KEPT_SCANS)
     }
 
-    /// A catalog of kept scans. `generation` is the number of the flush that created it.
+    /// Path of a catalog of kept scans. `generation` is the number of the flush that created it.
     pub(super) fn catalog(&self, generation: u64) -> PathBuf {
         self.kept_scans().join(format!("{CATALOG_PREFIX}{generation}"))
     }
@@ -109,7 +109,7 @@ impl Layout {
         number_behind(CATALOG_PREFIX, name)
     }
 
-    /// A file with the points of some kept scans.
+    /// Path of a file with the points of some kept scans.
     pub(super) fn segment(&self, segment: u64) -> PathBuf {
         self.kept_scans().join(format!("{SEGMENT_PREFIX}{segment}"))
     }
@@ -124,22 +124,22 @@ impl Layout {
         Self::generation_of(name).is_some() || Self::segment_of(name).is_some()
     }
 
-    /// The lock file of the writer.
+    /// Path of the lock file of the writer.
     pub fn lock(&self) -> PathBuf {
         self.folder.join("writer.lock")
     }
 
-    /// The folder of a tile.
+    /// Path of the folder of a tile.
     pub fn tile_folder(&self, tile: TileIndex) -> PathBuf {
         self.folder.join(folder_name(tile))
     }
 
-    /// The committed version of a tile's file.
+    /// Path of the committed version of a tile's file.
     pub fn current(&self, tile: TileIndex, file: TileFile) -> PathBuf {
         self.tile_folder(tile).join(file.name(self.storage))
     }
 
-    /// The table of a tile as of a flush. It is kept for readers that opened the map then and for snapshots.
+    /// Path of the table of a tile as of a flush. It is kept for readers that opened the map then and for snapshots.
     pub fn kept(&self, tile: TileIndex, flush_number: u64) -> PathBuf {
         let table = TileFile::Table.name(self.storage);
         self.tile_folder(tile).join(format!("{table}{KEPT_SUFFIX}{flush_number}"))
@@ -150,32 +150,32 @@ impl Layout {
         number_behind(KEPT_SUFFIX, name.strip_prefix(TileFile::Table.name(self.storage))?)
     }
 
-    /// Spilled updates of a tile, which exist only while the map is written.
+    /// Path of the spilled updates of a tile, which exist only while the map is written.
     pub fn spill(&self, tile: TileIndex) -> PathBuf {
         self.tile_folder(tile).join(SPILL)
     }
 
-    /// A replacement of a tile's next version, while it is incomplete.
+    /// Path of a replacement of a tile's next version, while it is incomplete.
     pub(super) fn replacement(&self, tile: TileIndex) -> PathBuf {
         self.tile_folder(tile).join(REPLACEMENT)
     }
 
-    /// The folder of snapshots.
+    /// Path of the folder of snapshots.
     pub fn snapshots(&self) -> PathBuf {
         self.folder.join(SNAPSHOTS)
     }
 
-    /// The file of a snapshot.
+    /// Path of the file of a snapshot.
     pub fn snapshot(&self, name: &SnapshotName) -> PathBuf {
         self.snapshots().join(name.as_str())
     }
 
-    /// A snapshot that is being written. No snapshot has this name.
+    /// Path of a snapshot that is being written. No snapshot has this name.
     pub(super) fn snapshot_next(&self) -> PathBuf {
         self.snapshots().join(SNAPSHOT_NEXT)
     }
 
-    /// The folder for files that repair removes from the map.
+    /// Path of the folder for files that repair removes from the map.
     pub fn quarantine(&self) -> PathBuf {
         self.folder.join(QUARANTINE)
     }
@@ -191,7 +191,7 @@ impl Layout {
         is_version || name == SPILL || name == REPLACEMENT
     }
 
-    /// The version of a tile's file to be committed next.
+    /// Path of the version of a tile's file to be committed next.
     pub fn next(&self, tile: TileIndex, file: TileFile) -> PathBuf {
         self.tile_folder(tile).join(file.next_name(self.storage))
     }

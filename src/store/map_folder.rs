@@ -67,7 +67,7 @@ pub(super) fn replace<T>(
         Ok(written)
     };
     replaced().map_err(|error| {
-        // The next attempt writes it again, but there may be none.
+        // Remove the incomplete file now: there may be no later attempt that would replace it.
         let _ = disk.remove_file(&next);
         Error::io(path, "replace", error)
     })

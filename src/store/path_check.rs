@@ -5,8 +5,8 @@ use super::map_folder::read_metadata;
 use crate::error::{Error, Result};
 use std::path::Path;
 
-/// Checks that a path is outside of any map, following symbolic links. A file or folder in a map would be taken for a
-/// part of it, or removed by its next change.
+/// Checks that a path is outside of any map, following symbolic links. A file or folder inside a map would be treated
+/// as a part of that map, or be removed by its next writer.
 ///
 /// # Errors
 ///

@@ -62,7 +62,8 @@ impl TileStore {
         let layout = Layout::new(folder);
         path_check::check_path(&*disk, folder)?;
         map_folder::create_folders(&*disk, folder)?;
-        // Before the lock, which creates a file, and again after it, when no other process can create a map here.
+        // Check before the lock is taken, because locking creates a file, and again with the lock, when no other
+        // process can create a map here.
         map_folder::check_is_free(&*disk, folder)?;
         let lock = WriterLock::take(&*disk, &layout)?;
         map_folder::check_is_free(&*disk, folder)?;
@@ -84,7 +85,7 @@ impl TileStore {
     /// Opens a map for writing: takes the lock, then restores the state of the last commit.
     pub fn open(disk: Arc<dyn Disk>, folder: &Path) -> Result<Self> {
         let layout = Layout::new(folder);
-        // Before the lock, so that a folder without a map is unchanged.
+        // Read before the lock is taken, because locking would create a file in a folder without a map.
         map_folder::read_metadata(&*disk, &layout)?;
         let lock = WriterLock::take(&*disk, &layout)?;
         let metadata = map_folder::read_metadata(&*disk, &layout)?;
@@ -106,7 +107,7 @@ impl TileStore {
             }
             store.recover()?;
             if store.is_metadata_behind() {
-                // New readers wait for this. Existing readers may use the last commit.
+                // New readers wait until `metadata.json` is replaced. Existing readers may use the last commit.
                 store.keep_for_late_readers();
                 store.tidy_up();
                 store.has_replaced_metadata = !store.is_metadata_behind();
@@ -145,8 +146,8 @@ impl TileStore {
         Ok(())
     }
 
-    /// Opens a map for reading, without a lock and without writing. The store shows the last flush, also after a writer
-    /// flushes again.
+    /// Opens a map for reading, without a lock and without writing. The store keeps showing the flush that it has
+    /// opened when a writer flushes again.
     pub fn open_read_only(disk: Arc<dyn Disk>, folder: &Path) -> Result<Self> {
         let layout = Layout::new(folder);
         for attempt in 0..OPEN_ATTEMPTS {
@@ -167,8 +168,8 @@ impl TileStore {
         Err(Error::Changed { path: folder.to_owned() })
     }
 
-    /// Returns the tiles of a map whose `metadata.json` or `commits.log` cannot be read, from other sources; for
-    /// reading only.
+    /// Returns a read-only store for a map whose `metadata.json` or `commits.log` cannot be read. The metadata and the
+    /// list of tiles were recovered from other files.
     pub fn of_commits(
         disk: Arc<dyn Disk>,
         folder: &Path,

@@ -4,7 +4,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// Wraps a disk and ignores all syncs: writes are not durable, and no flush waits.
+/// Wraps a disk and ignores all syncs: writes are not durable, and a flush does not wait for the storage device.
 ///
 /// For maps that are built again after a crash, such as the shards of a cluster build
 /// ([`operations::move_shard`](crate::operations::move_shard()) later syncs each file once). Do not use it for a

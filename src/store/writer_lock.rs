@@ -23,7 +23,7 @@ impl WriterLock {
         }
     }
 
-    /// Checks that the lock is still effective. It is not if another program has removed its file.
+    /// Checks that the lock is still effective. It is lost if another program has removed the lock file.
     ///
     /// # Errors
     ///

@@ -56,7 +56,7 @@ impl Measured {
         self.points.iter().map(|point| point.map(f64::from)).collect()
     }
 
-    /// Transforms each number to the world frame.
+    /// Transforms the points to the world frame by plain scalar arithmetic.
     fn in_world(&self) -> Scan {
         let rotation = self.world_from_sensor.rotation.to_rotation_matrix();
         let at = self.world_from_sensor.translation;
@@ -80,7 +80,7 @@ impl Measured {
         writer.write(&scan).unwrap();
         let mut source = read_scan_stream(&*bytes, Path::new("scans"), false).unwrap();
         let stored = source.next_stored(&PointBudget::default()).unwrap().unwrap();
-        // The stream has normalized the quaternion once more.
+        // The stream normalizes the quaternion again, which may change its last bits. Use the original pose.
         StoredScan { world_from_sensor, ..stored }
     }
 }
@@ -116,7 +116,8 @@ impl<M: Mapper> AnyMapper for M {
     }
 }
 
-/// Mappers to test: one in memory, and two out of core with little memory of each kind.
+/// Returns the mappers to test: one in memory, and two out of core, one with a small cache and write buffer, and one
+/// with a tight memory limit.
 fn mappers(config: &MapConfig, folder: &TempDir) -> Vec<Box<dyn AnyMapper>> {
     let mut mappers: Vec<Box<dyn AnyMapper>> = vec![Box::new(InMemoryMapper::new(config.clone()).unwrap())];
     let little = [
@@ -145,7 +146,8 @@ fn configs() -> impl Iterator<Item = (MapConfig, bool)> {
     })
 }
 
-/// Returns the digest and the reports of scans in a form, which are equal for all mappers.
+/// Inserts the scans, passed in one form, into all mappers. Checks that their digests and reports are equal, and
+/// returns them.
 fn mapped(config: &MapConfig, scans: &[Measured], form: usize) -> (String, Vec<ScanReport>) {
     let folder = TempDir::new().unwrap();
     let mut outcomes = mappers(config, &folder).into_iter().map(|mut mapper| {
@@ -290,7 +292,7 @@ fn a_failed_insert_changes_nothing() {
         both.insert_points(scan).unwrap_err();
     }
     assert!((content(both.local()), both.archive().digest().unwrap()) == before);
-    // Its points cannot be transformed, so none counts.
+    // The pose is not finite, so both points are counted as not finite.
     assert_eq!(both.insert_points(&turned_nowhere).unwrap().0.skipped.not_finite, 2);
 }
 

@@ -1,4 +1,5 @@
-//! Guarded clearing: the rule for all tile sizes and memory limits, and what a map does with it.
+//! Guarded clearing: maps compared with the naive rule for all tile sizes and memory limits, and how a map stores its
+//! rule.
 
 use std::path::Path;
 use testkit::faulty_disk::{Fault, FaultyDisk};
@@ -44,7 +45,7 @@ fn guarded(resolution_m: f64, tile_size_m: f64) -> MapConfig {
 #[test]
 fn guarded_maps_equal_the_naive_map_for_all_tile_sizes_and_memory_limits() {
     let scans = &drive(150)[..2];
-    // With little memory each tile gets all marks near it, so tiny tiles are slow.
+    // With little memory, each tile is processed with all hits and misses near it, so tiny tiles are slow.
     for (voxels, limits) in [(2, &[][..]), (5, &[60_000]), (16, &[0, 60_000]), (100, &[0])] {
         let config = guarded(0.4, 0.4 * f64::from(voxels));
         let mut reference = ReferenceMap::new(&config);
@@ -149,7 +150,7 @@ fn a_map_keeps_its_rule() {
     mapper.flush().unwrap();
     drop(mapper);
 
-    // Without a rule, the map's is used; another one is an error.
+    // A configuration without a rule uses the map's rule. A different rule is an error.
     let open = |config: MapConfig| MapOptions::new().config(config).open(at("map"));
     let own = open(config.clone().with_clearing(None)).unwrap();
     assert_eq!(own.config().rays.clearing, config.rays.clearing);
@@ -175,7 +176,7 @@ fn a_map_keeps_its_rule() {
     assert_eq!(metadata["version"], "1.1");
     assert!(text("other").contains(r#""version": "1.0""#));
 
-    // Rebuilt from the kept scans by the other rule.
+    // Rebuild the map from its kept scans by OctoMap's rule.
     let reader = MapReader::open(at("map"), 0).unwrap();
     let octomap = |rays: &voxtile::RayConfig| {
         let mut rays = *rays;

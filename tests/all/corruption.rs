@@ -154,7 +154,7 @@ fn check_reading(disk: &FaultyDisk, before: &Digests, tile: Option<TileIndex>, i
         assert!(matches!(reader, Err(Error::Damaged { .. })), "{what}: {reader:?}");
         return;
     };
-    assert!(tile.is_some() || is_derived, "{what}: nothing noticed");
+    assert!(tile.is_some() || is_derived, "{what}: opening the map must report the damage");
     for &index in before.keys() {
         match reader.tile(index) {
             Err(Error::Damaged { tile: named, .. }) => {
@@ -498,8 +498,8 @@ fn can_be_resumed(disk: &FaultyDisk) -> bool {
     }
 }
 
-/// The flush is committed and `metadata.json` replaced, some of its tables have their final names, and the log is
-/// damaged.
+/// The crash occurs after the commit and the replacement of `metadata.json`, when some tables have their final names.
+/// The log is damaged.
 #[test]
 fn a_repair_with_a_damaged_log_completes_the_last_commit_and_drops_the_input() {
     for storage in STORAGES {
@@ -531,7 +531,7 @@ fn a_repair_with_a_damaged_log_completes_the_last_commit_and_drops_the_input() {
     }
 }
 
-/// As after a copy during a flush: the log and one tile are of an earlier flush.
+/// As after a copy that was made during a flush: the log and one tile are of an earlier flush.
 #[test]
 fn a_map_of_tiles_from_two_flushes_cannot_be_resumed() {
     for storage in STORAGES {

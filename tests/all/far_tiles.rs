@@ -162,7 +162,7 @@ fn rays_are_fast_with_a_very_distant_tile() {
     check_far(&*local.reader().view(), &wall);
 }
 
-/// So many tiles, so far apart, that the index drops its fine levels of cubes.
+/// There are so many tiles, so far apart, that the index of empty space drops its finest levels.
 #[test]
 fn rays_are_fast_with_thousands_of_scattered_tiles() {
     let mut random = Random(11);

@@ -109,7 +109,7 @@ impl Build {
         *progress = Progress { is_early: false, safe: done, tried: done, failed: None };
         assert_eq!(mapper.scan_number(), done as u64);
         let digest = insist(disk, &mut mapper, look, |mapper| mapper.digest())?;
-        assert_eq!(digest, self.digests[done], "as opened");
+        assert_eq!(digest, self.digests[done], "after opening");
         let mut readers: Vec<MapReader> = Vec::new();
         for (scan, number) in self.scans.iter().zip(1..).skip(done) {
             insist(disk, &mut mapper, look, |mapper| mapper.insert_scan(scan))?;
@@ -318,8 +318,8 @@ fn crash_again_while_opening(build: &Build) {
                     break;
                 }
                 points += 1;
-                // An error, unless the last steps were reached: a later commit also replaces `metadata.json` and the
-                // log.
+                // Opening fails, except if the crash is in its last steps: the next commit repeats these, so their
+                // errors are only logged.
                 drop(opened);
                 let what = format!("{fault:?}, {unsynced:?}, again at {again} of opening");
                 let left = recovering.after_crash(Unsynced::Shuffled(again));
@@ -461,7 +461,7 @@ fn a_failed_sync_and_then_a_full_disk_lose_nothing() {
             mapper.tile(tile).unwrap();
         }
         mapper.flush().unwrap_or_else(|error| panic!("at {lost}, full {full}: {error:#}"));
-        build.check_digest(&mapper, "with room");
+        build.check_digest(&mapper, "after the disk has space again");
         let left = disk.after_crash(Unsynced::Dropped);
         build.check_digest(&MapReader::open(at(&left), 0).unwrap(), "after a crash");
     }
@@ -523,7 +523,7 @@ fn conversion_of_the_original_format_is_atomic() {
     let after = digest_of(&done, None).unwrap();
     let job = Job::new(foreign.copy(), map(), convert.clone(), |disk| digest_of(disk, None).unwrap());
     sweep(&job, faults(&job, &[Fault::Crashes], 2), &EVERY_CRASH);
-    // The disk is full twice, at any two changes.
+    // The disk becomes full twice, at any two changes.
     for (first, second) in some_of((0..90).flat_map(|first| (0..90).map(move |second| (first, second))), 6) {
         let disk = foreign.copy();
         let mut mapper = build.open(&disk).unwrap();
@@ -536,7 +536,7 @@ fn conversion_of_the_original_format_is_atomic() {
         mapper.flush().unwrap_or_else(|error| panic!("full at {first}, at {second}: {error:#}"));
         assert_eq!(mapper.digest().unwrap(), after);
     }
-    // A reader that was opened before sees the old content.
+    // A reader that was opened before the conversion sees the old content.
     let disk = foreign.copy();
     let reader = MapReader::open(at(&disk), 0).unwrap();
     convert(&disk).unwrap();

@@ -133,7 +133,7 @@ fn damage_is_an_error_unless_it_is_in_an_unread_part() {
     assert!(refused > 100, "{refused}");
 }
 
-/// A file as long as the one recorded in the log, and valid except for the text of its parameters.
+/// The file has the length that the log records, and valid checksums. Only the text of its parameters differs.
 #[test]
 fn a_file_that_differs_from_the_log_is_an_error() {
     let disk = small(Storage::Compact, 4);
@@ -141,7 +141,7 @@ fn a_file_that_differs_from_the_log_is_an_error() {
     let voxel = [3, 2, 1];
     let (path, mut bytes) = table(&disk, &reader, voxel);
     let length = u32::from_le_bytes(bytes[60..64].try_into().unwrap()) as usize;
-    // Within the name of a key.
+    // Flip a bit in the name of a JSON key of the parameters.
     bytes[72 + 3] ^= 1;
     let parameters = crc32fast::hash(&bytes[72..72 + length]);
     bytes[64..68].copy_from_slice(&parameters.to_le_bytes());

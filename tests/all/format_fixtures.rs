@@ -207,7 +207,7 @@ fn write_plain(map: &Path, scans: &[Scan]) {
     decay(map, &Decay::new(20.0), |_, _| ()).unwrap();
 }
 
-/// Files of a writer that was killed between two flushes: next versions of tiles, and waiting updates.
+/// Files of a writer that was killed between two flushes: next versions of tiles, and spilled updates.
 fn write_killed(folder: &Path, scans: &[Scan]) {
     let place = TempDir::new().unwrap();
     let map = place.path().join("map");

@@ -31,7 +31,7 @@ fn readers_survive_every_file_of_the_corpus() {
 #[test]
 fn every_seed_is_a_valid_file() {
     for (target, name, bytes) in seeds::all() {
-        let (_, read) = TARGETS.iter().find(|(of, _)| *of == target).expect("a seed is of a target");
+        let (_, read) = TARGETS.iter().find(|(of, _)| *of == target).expect("each seed names a target");
         assert!(read(&bytes), "{target} {name}");
     }
 }

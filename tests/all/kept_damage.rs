@@ -159,7 +159,7 @@ fn damage_to_kept_scans_is_repaired_and_restores_no_removed_scan() {
             }
             let before = files_of_scans(&damaged);
             let repair = repaired(&damaged, &what);
-            // The header of a catalog only repeats its name.
+            // The header is the same for all catalogs, so damage to it loses no scan.
             let is_header = ["catalog", "a bit at 0", "a bit at 14"].map(|part| what.contains(part));
             let is_complete = is_header[0] && (is_header[1] && how.ends_with(" 0") || is_header[2]);
             assert_eq!((repair.is_complete(), repair.tiles_lost), (is_complete, 0), "{what}: {repair:?}");
@@ -429,7 +429,7 @@ fn a_deletion_that_cannot_remove_points_fails_and_is_completed_by_the_next() {
     let disk = a_map();
     let catalog = map().join("kept_scans/catalog.1");
     let segment = map().join("kept_scans/segment.3");
-    // It is unknown whether the map needs the points.
+    // Without the map's own catalog it is unknown whether the map needs the points.
     let own = files_of_scans(&disk)
         .into_keys()
         .find(|path| path != &catalog && path.to_string_lossy().contains("catalog"));

@@ -234,7 +234,7 @@ fn failed_renames_are_reported_and_completed_by_the_next_writer() {
     assert!(faults > 20);
 }
 
-/// Also files that no current operation leaves.
+/// Includes files that no current operation leaves.
 #[test]
 fn unfinished_replacements_are_reported_and_removed() {
     for start in [four_scans(Storage::Compact, false), foreign()] {
@@ -426,7 +426,7 @@ fn a_repeated_removal_succeeds_and_one_of_unknown_scans_fails() {
     let writer = TileStore::open(disk.shared(), map()).unwrap();
     removed(&disk).unwrap();
     drop(writer);
-    // Later changes of the map do not matter.
+    // The repeated removal also succeeds after other changes of the map.
     cleared(&disk).unwrap();
     removed(&disk).unwrap();
 }
@@ -441,7 +441,8 @@ fn a_revert_removes_unneeded_kept_scans() {
     assert!(segments(&disk).0.len() < before.len());
 }
 
-/// A removal of the second map first removes the files with its id.
+/// The removal of a second map begins with `metadata.json` and `commits.log`, which contain its id. If it is killed
+/// then, the next removal completes it.
 #[test]
 fn a_removal_completes_the_removal_of_a_second_map() {
     let start = four_scans(Storage::Compact, true);
@@ -460,7 +461,7 @@ fn a_removal_completes_the_removal_of_a_second_map() {
     }
 }
 
-/// The second map, left by an online remap, has evidence of all scans.
+/// A killed online remap leaves a second map, which has the evidence of all scans, including removed ones.
 #[test]
 fn a_removal_removes_the_second_map_of_a_killed_remap() {
     let start = four_scans(Storage::Compact, true);

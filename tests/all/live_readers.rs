@@ -149,7 +149,7 @@ fn concurrent_readers_see_complete_scans() {
             config.with_tight_memory_bytes(bytes),
         ] {
             let (expired, answered) = run_concurrently(seed, &config);
-            assert!(answered > expired, "{expired} questions expired, {answered} were answered");
+            assert!(answered > expired, "{expired} queries expired, {answered} were answered");
         }
     }
 }
@@ -174,7 +174,7 @@ fn a_view_that_holds_too_much_expires_and_the_next_does_not() {
         held = held.max(with_views.saturating_sub(mapper.statistics().memory.readers));
     }
     assert!(matches!(view.voxel_at([0.0; 3]), Err(Error::Expired)));
-    // An eighth of the limit, and the table of held tiles.
+    // A view may hold an eighth of the limit, plus the table of held tiles.
     assert!(held < 2 * 40_000 / 8, "{held} bytes were held");
     drop(view);
     assert_eq!(voxels_of(&reader.view()), naive_maps(&config, &scans)[SCANS]);

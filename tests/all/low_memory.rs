@@ -72,7 +72,7 @@ fn statistics_count_everything_with_little_memory() {
     let statistics = mapper.statistics();
     let in_memory = expected.statistics().cached.bytes();
     assert!(in_memory > 4 * BYTES as u64, "{in_memory} bytes do not need more than the limit");
-    // The updates of a scan are estimated before they are counted exactly.
+    // The memory for the updates of a scan is only estimated in advance, so the limit may be exceeded.
     assert!(most < 2 * BYTES as u64, "{most} bytes");
     assert!(statistics.io.encoded > 20 && statistics.io.decoded > 0, "{:?}", statistics.io);
     assert!(statistics.compact_tiles > 0 && statistics.memory.compact_tiles > 0);
@@ -81,7 +81,7 @@ fn statistics_count_everything_with_little_memory() {
     assert_eq!((flushed.dirty_tiles, flushed.dirty_compact_tiles, flushed.buffered_tiles), (0, 0, 0));
     assert_eq!(flushed.memory.in_flight, 0);
     let written = flushed.io.bytes_written as f64 / flushed.disk_bytes as f64;
-    assert!(written < 4.0, "{written} bytes written for each of the map's");
+    assert!(written < 4.0, "{written} bytes written per byte of the map");
     assert_eq!(flushed.stalls.count == 0, flushed.stalls.worst_us == 0);
     assert!(flushed.stalls.p50_us <= flushed.stalls.p99_us);
 }
@@ -104,11 +104,11 @@ fn tiles_out_of_range_are_written_once_with_their_updates() {
     let statistics = mapper.statistics();
     let of_tiles = |count: u64| count as f64 / statistics.tiles as f64;
     let [saved, read] = [statistics.io.saves, statistics.io.loads].map(of_tiles);
-    assert!(saved > 0.3, "{saved} saves a tile: too much memory");
-    assert!(read < 0.05, "{read} reads a tile");
+    assert!(saved > 0.3, "{saved} saves per tile: the limit is too large for this test");
+    assert!(read < 0.05, "{read} reads per tile");
     mapper.flush().unwrap();
     let saved = of_tiles(mapper.statistics().io.saves);
-    assert!(saved < 1.35, "{saved} saves a tile");
+    assert!(saved < 1.35, "{saved} saves per tile");
     assert_eq!(mapper.digest().unwrap(), expected.digest().unwrap());
 }
 
@@ -147,8 +147,8 @@ fn updates_of_tiles_on_disk_wait_in_files() {
         expected.insert_scan(scan).unwrap();
     }
     let digest = expected.digest().unwrap();
-    // With the first limit a single scan is too large. With the second a tile would be loaded for each update without
-    // the files.
+    // With the first limit, the updates of a single scan are too large. With the second, each update would load a tile
+    // if updates did not wait in files.
     for (bytes, most_loads_of_tile) in [(100_000, 2.0), (2_000_000, 0.25)] {
         let path = folder.path().join(format!("map_{bytes}"));
         let tight = config.clone().with_tight_memory_bytes(bytes);
@@ -162,14 +162,14 @@ fn updates_of_tiles_on_disk_wait_in_files() {
         let statistics = mapper.statistics();
         assert!(most_in_files > 100_000, "{most_in_files} bytes in files");
         let loads = statistics.io.loads as f64 / statistics.tiles as f64;
-        assert!(loads < most_loads_of_tile, "{loads} reads a tile in {bytes} bytes");
+        assert!(loads < most_loads_of_tile, "{loads} reads per tile with {bytes} bytes");
         assert_eq!(mapper.digest().unwrap(), digest);
         mapper.flush().unwrap();
         assert_eq!(MapReader::open(&path, 0).unwrap().digest().unwrap(), digest);
         let statistics = mapper.statistics();
         assert_eq!(statistics.spilled_bytes, 0);
         let written = statistics.io.bytes_written as f64 / statistics.disk_bytes as f64;
-        assert!(written < 4.0, "{written} bytes written for each of the map's");
+        assert!(written < 4.0, "{written} bytes written per byte of the map");
     }
 }
 

@@ -2,8 +2,9 @@
 
 /// Scans as borrowed slices, in single precision, in either frame, with poses of every form.
 mod borrowed_scans;
-/// Conversion between storages.
+/// Guarded clearing.
 mod clearing;
+/// Conversion between storages.
 mod convert;
 /// Damage to every byte of every file of a map: found and repaired.
 mod corruption;

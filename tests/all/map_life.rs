@@ -177,7 +177,6 @@ fn random_lives_equal_the_naive_map_of_the_remaining_scans() {
     }
 }
 
-/// An open reader continues to see removed tiles.
 #[test]
 fn an_open_reader_sees_removed_tiles() {
     let (life, disk) = (removals(), FaultyDisk::new(Fault::None));

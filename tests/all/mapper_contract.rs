@@ -82,7 +82,7 @@ fn out_of_core_equals_the_naive_map_for_any_cache_and_after_flush_and_reopen() {
             assert_eq!(voxels_of(&mapper), reference.voxels, "before flush");
             assert!(mapper.cached_tile_indices().len() <= cache_tiles);
             if cache_tiles == 3 {
-                // Updates wait for tiles on disk.
+                // Some updates are still in the write buffer.
                 assert_coarse_answers_are_maxima(&mapper);
             }
             let unsaved = mapper.digest().unwrap();
@@ -91,10 +91,11 @@ fn out_of_core_equals_the_naive_map_for_any_cache_and_after_flush_and_reopen() {
             drop(mapper);
 
             let mut mapper = OutOfCoreTileMapper::open(
-                MapPath::on(UnsyncedDisk::shared(), folder.path().join("map")), // A map keeps its storage, whatever is asked for.
+                MapPath::on(UnsyncedDisk::shared(), folder.path().join("map")),
                 config.clone().with_storage(OctoMap),
             )
             .unwrap();
+            // A map keeps its storage, although another one was requested.
             assert_eq!(mapper.config().storage, storage);
             assert_eq!(mapper.digest().unwrap(), unsaved);
             assert_eq!(mapper.scan_number(), 12);
@@ -115,7 +116,7 @@ fn out_of_core_equals_the_naive_map_for_any_cache_and_after_flush_and_reopen() {
     }
 }
 
-/// Rays that leave the window around the sensor.
+/// Rays that leave the window around the sensor, in which updates are collected in dense pages.
 #[test]
 fn very_distant_points_are_mapped_like_others() {
     for mode in [InsertMode::PerScan, InsertMode::PerRay] {
@@ -164,8 +165,7 @@ fn maps_do_not_depend_on_the_number_of_threads() {
 }
 
 #[test]
-fn the_answer_does_not_depend_on_the_form_of_the_octree_and_coarse_answers_are_the_tables_maxima_at_every_moment()
- {
+fn all_forms_of_octrees_agree_and_coarse_answers_are_the_maxima_of_the_table() {
     let mut digests = Vec::new();
     let mut nodes = Vec::new();
     let cached = [(1, Some(1)), (2, Some(64)), (4, None), (16, Some(4096))];
@@ -200,11 +200,11 @@ fn assert_coarse_answers_are_maxima(view: &impl MapView) {
         }
         for (node, max) in maxima.into_iter().step_by(7) {
             let first = node.map(|index| index << (16 - depth));
-            // Any voxel of the node, known or unknown.
+            // The center of the node, whose voxel may be known or unknown.
             let point = view.config().grid.center_m(first.map(|index| index + (1 << (16 - depth)) / 2));
             let answer = view.occupancy_at_depth(point, depth as u8).unwrap().probability();
             if depth == 16 {
-                // At the finest depth, the exact voxel.
+                // At the finest depth the answer is that of the voxel itself.
                 assert_eq!(answer, view.occupancy_at(point).unwrap().probability(), "node {node:?}");
                 continue;
             }
@@ -334,7 +334,7 @@ fn keys_on_disk_are_octomaps_and_in_morton_order() {
     }
 }
 
-/// The lowest tile is cut at the lowest index, and the next one begins where it ends.
+/// The lowest tile is cut off at the lowest voxel index, and the next tile begins at its end.
 #[test]
 fn points_at_the_end_of_all_indices_are_in_their_own_tiles() {
     let config = MapConfig::new(0.1, 10.0).unwrap();

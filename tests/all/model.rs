@@ -77,7 +77,7 @@ fn live(seed: u64, config: &MapConfig) {
             choice => {
                 // Tiles evicted since the last flush are on disk, but must not count.
                 drop(mapper);
-                // A background flush is completed.
+                // Dropping the mapper completes a background flush.
                 flushed = begun.take().unwrap_or(flushed);
                 match choice {
                     12 => {

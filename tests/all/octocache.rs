@@ -7,15 +7,15 @@ use voxtile::space::MortonCode;
 /// A leaf of a small octree: its child numbers from the root down.
 type Leaf = Vec<u8>;
 
-/// Steps from a leaf up to the lowest common ancestor with another leaf, and down to that.
+/// Number of steps from a leaf up to the lowest common ancestor with another leaf, and down to that leaf.
 fn distance(a: &Leaf, b: &Leaf) -> usize {
     let common = a.iter().zip(b).take_while(|(a, b)| a == b).count();
     (a.len() - common) + (b.len() - common)
 }
 
-/// The paper's F, the sum over neighbors in the sequence, plus the paths from the root to the first leaf and from the
-/// last one back. With all leaves at one depth this is a constant; in a pruned tree, an order could otherwise save cost
-/// by ending at a deep leaf.
+/// Cost of a sequence of leaves: the paper's F (the sum of the distances between neighbors), plus the paths from the
+/// root to the first leaf and from the last leaf to the root. The paths are constant if all leaves have the same depth.
+/// In a pruned tree, a sequence could otherwise save cost by ending at a deep leaf.
 fn cost(sequence: &[&Leaf]) -> usize {
     let ends = [sequence.first(), sequence.last()].map(|leaf| leaf.map_or(0, |leaf| leaf.len()));
     sequence.windows(2).map(|pair| distance(pair[0], pair[1])).sum::<usize>() + ends[0] + ends[1]

@@ -99,7 +99,7 @@ fn a_table_of_a_map_of_octomap_writes_the_bytes_of_its_tree() {
 }
 
 #[test]
-fn maps_of_octomap_are_normal_trees_that_grow_again_from_their_leaves() {
+fn maps_of_octomap_are_normalized_trees_with_consistent_leaves() {
     for path in maps_of_octomap() {
         let bytes = std::fs::read(&path).unwrap();
         let tree = read(bytes.as_slice()).unwrap().tree;

@@ -139,7 +139,8 @@ fn single_voxels_and_cubes_that_are_pruned_whole() {
 
 #[test]
 fn a_file_is_pruned_as_far_as_by_octomap() {
-    // Cubes of 2 voxels with one value each: nothing to prune among voxels, where OctoMap begins, but something above.
+    // Cubes of 2 voxels with one value each. OctoMap's pruning by state begins at the voxels and finds nothing there,
+    // although nodes above could be pruned.
     let mut map = InMemoryMapper::new(config()).unwrap();
     let value = |voxel: [i32; 3]| {
         1 + voxel.iter().zip([1, 2, 4]).map(|(k, bit)| (k >> 1 & 1) as u32 * bit).sum::<u32>()
@@ -245,7 +246,7 @@ fn in_blocks(voxels: &BTreeMap<MortonCode, f32>, format: OctreeFormat, seed: u64
             StreamOutcome::Again(further) => pruning = further,
         }
     }
-    panic!("a stream with a known depth of pruning is written");
+    panic!("a stream with a given depth of pruning must be complete");
 }
 
 fn add_blocks(

@@ -20,7 +20,7 @@ pub fn config() -> MapConfig {
     MapConfig::new(0.1, 1.0).unwrap().with_cache_tiles(4).with_write_buffer_bytes(5_000)
 }
 
-/// The same map in memory, and out of core with waiting updates.
+/// Returns the same map twice: in memory, and out of core with updates in the write buffer.
 fn maps(folder: &TempDir) -> (InMemoryMapper, OutOfCoreTileMapper) {
     let mut in_memory = InMemoryMapper::new(config()).unwrap();
     let path = folder.path().join("map");
@@ -434,7 +434,7 @@ fn results_of_many_points_are_in_their_order() {
 }
 
 #[test]
-fn the_merged_octree_holds_every_voxel_and_refuses_what_octomap_cannot_address() {
+fn the_merged_octree_has_every_voxel_and_rejects_voxels_beyond_octomaps_keys() {
     let folder = TempDir::new().unwrap();
     let (mut map, out_of_core) = maps(&folder);
     let tree = out_of_core.merged_octree(None, 1 << 20).unwrap();
@@ -479,9 +479,9 @@ fn invalid_queries_are_errors_with_a_reason() {
 }
 
 #[test]
-fn a_ray_that_hardly_moves_along_an_axis_ends_and_meets_what_is_ahead() {
+fn a_ray_with_a_tiny_component_of_its_direction_ends_and_hits_the_wall() {
     let mut map = InMemoryMapper::new(config()).unwrap();
-    // A wall in front of a sensor on a border of voxels: rays that leave it downwards pass below.
+    // A wall of one layer of voxels in front of a sensor that is on a border of voxels.
     let wall = (-5..5).map(|y| [2.05, 0.1 * f64::from(y) + 0.05, 0.05]).collect();
     map.insert_scan(&Scan { origin: [0.05, 0.05, 0.05], points: wall, intensities: None }).unwrap();
     for slow in [-1e-310, -f64::from_bits(1), 1e-310, -1e-300] {

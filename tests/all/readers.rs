@@ -89,7 +89,7 @@ fn fields_of_any_type_order_and_padding_are_read() {
 }
 
 #[test]
-fn wrong_pcd_files_are_told_what_is_wrong() {
+fn invalid_pcd_files_are_errors_with_a_reason() {
     let good = String::from_utf8(pcd("ascii", &points(3))).unwrap();
     let changed = |from: &str, to: &str| message_of(read_pcd(good.replace(from, to).as_bytes()));
     for (from, to, message) in [
@@ -191,7 +191,7 @@ fn points_in_the_world_frame_are_not_deskewed() {
 }
 
 #[test]
-fn files_come_in_natural_order_and_scans_without_poses_are_refused() {
+fn files_are_read_in_natural_order_and_scans_without_poses_are_errors() {
     use voxtile_formats::PoseSource;
     let (_outer, folder) = lone_folder();
     let names: Vec<String> = (0..12).map(|number| format!("full{number}.pcd")).collect();
@@ -221,7 +221,7 @@ fn files_come_in_natural_order_and_scans_without_poses_are_refused() {
 }
 
 #[test]
-fn a_file_without_the_viewpoint_that_others_have_is_an_error_of_its_own() {
+fn one_file_without_viewpoint_is_an_error_and_can_be_skipped() {
     let (_outer, folder) = lone_folder();
     for number in 0..2 {
         fs::write(folder.join(format!("{number}.pcd")), pcd("binary", &points(5))).unwrap();
@@ -235,7 +235,7 @@ fn a_file_without_the_viewpoint_that_others_have_is_an_error_of_its_own() {
 }
 
 #[test]
-fn a_matrix_that_is_a_rotation_to_a_few_digits_gives_a_pose_that_does_not_scale() {
+fn a_rounded_rotation_matrix_gives_a_pose_without_scale() {
     let folder = TempDir::new().unwrap();
     fs::write(folder.path().join("0.pcd"), pcd("binary", &points(5))).unwrap();
     let poses = folder.path().join("kitti.txt");
@@ -246,9 +246,9 @@ fn a_matrix_that_is_a_rotation_to_a_few_digits_gives_a_pose_that_does_not_scale(
     assert!((pose.to_world()([1.0, 0.0, 0.0])[0] - 1.6).abs() < 1e-3);
 }
 
-/// Stamps and lengths decide nothing where poses go line by line.
+/// The poses in a text file belong to the clouds in order: time stamps and lengths of quaternions have no effect.
 #[test]
-fn plain_poses_of_pcd_files_have_any_stamps_and_lengths() {
+fn poses_in_order_may_have_any_time_stamps_and_lengths() {
     let folder = TempDir::new().unwrap();
     for number in 0..2 {
         fs::write(folder.path().join(format!("{number}.pcd")), pcd("binary", &points(5))).unwrap();
@@ -271,7 +271,8 @@ fn plain_poses_of_pcd_files_have_any_stamps_and_lengths() {
     }
 }
 
-/// How maps of earlier versions know an input: by its files, and by the poses that are not in them.
+/// Returns the fingerprint by which earlier versions identify an input: a hash of its files, and of poses that are not
+/// in these files.
 fn fingerprint_of(files: &[PathBuf], poses: &[Pose]) -> String {
     let (mut hasher, mut bytes) = (blake3::Hasher::new(), 0);
     for path in files {
@@ -318,7 +319,7 @@ fn fingerprints_of_pcd_files_are_those_of_earlier_versions() {
 }
 
 #[test]
-fn folders_of_other_programs_have_the_scans_and_points_that_their_notes_say() {
+fn folders_of_other_programs_have_the_known_numbers_of_scans_and_points() {
     for (name, folder, scans, points) in [
         ("scans_1", Some(fixtures("scans_1")), 6, 1800),
         ("fastlio_hku_1", shared_data("fastlio_hku_1"), 314, 1_603_961),

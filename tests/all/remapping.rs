@@ -26,7 +26,7 @@ fn a_map_with_kept_scans() -> (FaultyDisk, State) {
     (disk, State::default().after(&scans, &config()))
 }
 
-/// Any damaged byte of the kept scans is found, or does not matter; a replay that finds it changes nothing.
+/// Any damaged byte of the kept scans is found, or has no effect. A replay that finds damage changes nothing.
 #[test]
 fn damage_to_kept_scans_is_an_error_and_changes_nothing() {
     let (whole, state) = a_map_with_kept_scans();
@@ -183,7 +183,7 @@ fn scans_within_the_tolerance_are_unchanged_and_reported() {
     );
 }
 
-/// The same scans in little memory, and a stop during the replay.
+/// A dry run, a remap that is stopped during the replay, and then a complete one.
 #[test]
 fn a_dry_run_and_a_stop_change_nothing() {
     let (disk, state) = a_map_with_kept_scans();

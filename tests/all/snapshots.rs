@@ -157,7 +157,7 @@ fn own_bytes_are_freed_by_a_deletion() {
 }
 
 #[test]
-fn wrong_names_and_other_refusals_say_what_to_do() {
+fn wrong_names_are_errors_with_a_remedy() {
     let (disk, _) = small(Storage::OctoMap);
     let error = snapshot(at(&disk), &name("first")).unwrap_err();
     assert!(matches!(error, Error::AlreadyExists { .. }), "{error:#}");
@@ -172,13 +172,12 @@ fn wrong_names_and_other_refusals_say_what_to_do() {
     ] {
         assert!(error.to_string().contains("`voxtile snapshots /city/map` lists them"), "{error:#}");
     }
-    assert_eq!(snapshots(at(&disk)).unwrap().len(), 2, "nothing was kept in vain");
+    assert_eq!(snapshots(at(&disk)).unwrap().len(), 2, "a failed call must not create a snapshot");
     let writer = TileStore::open(disk.shared(), map()).unwrap();
     assert!(matches!(snapshot(at(&disk), &name("x")), Err(Error::Locked { .. })));
     drop(writer);
 }
 
-/// A map of the original format first gets its checksums.
 #[test]
 fn a_map_of_the_original_format_is_converted_by_its_first_snapshot() {
     let (disk, digests) = small(Storage::OctoMap);
@@ -237,7 +236,7 @@ fn check_repair(disk: &FaultyDisk, digests: &[Digest], path: &Path, what: &str) 
     assert!(repair.actions > 0 && repair.tiles_lost == 0, "{what}");
     let lost: u64 =
         disk.files().keys().filter(|path| path.starts_with(map().join("quarantine"))).count() as u64;
-    assert!(lost > 0 || is_missing, "{what}: nothing is deleted");
+    assert!(lost > 0 || is_missing, "{what}: the damaged file must be in quarantine");
     let verification = verify(at(disk), |_| (), |_, _| ()).unwrap();
     assert!(verification.is_whole(), "{what}");
     assert_eq!(digest_of(disk, None).unwrap(), digests[2], "{what}");
@@ -249,10 +248,10 @@ fn check_repair(disk: &FaultyDisk, digests: &[Digest], path: &Path, what: &str) 
     }
 }
 
-/// One of two snapshots has lost a table of a tile. The lookup by flush number must not use the table of the other one,
-/// whichever name is first.
+/// One of two snapshots has lost a table of a tile. The look-up by flush number must not use the table of the other
+/// snapshot, whatever their names are.
 #[test]
-fn a_snapshot_that_is_led_to_a_table_of_another_is_found() {
+fn a_snapshot_without_its_own_table_is_damage() {
     for names in [["a", "b"], ["b", "a"]] {
         let disk = FaultyDisk::new(Fault::None);
         let mut mapper = OutOfCoreTileMapper::create(at(&disk), config()).unwrap();
@@ -345,7 +344,8 @@ fn snapshots_survive_the_loss_of_the_log_and_of_current_tables() {
     assert_eq!(digest_of(&disk, None).unwrap(), digests[0], "the tile is back");
 }
 
-/// A flush is committed and named by `metadata.json`, its tables wait for their names, and the log is lost.
+/// The crash occurs after a flush is committed and recorded in `metadata.json`, and before all its tables have their
+/// final names. The log is lost.
 #[test]
 fn a_repair_that_completes_a_commit_does_not_change_snapshots() {
     for storage in [Storage::OctoMap, Storage::Compact] {
@@ -385,7 +385,7 @@ fn a_repair_that_completes_a_commit_does_not_change_snapshots() {
 }
 
 #[test]
-fn something_else_in_place_of_the_folder_of_snapshots_is_damage_also_where_the_map_has_none() {
+fn a_file_in_place_of_the_folder_of_snapshots_is_damage_even_without_snapshots() {
     let (disk, digests) = small(Storage::OctoMap);
     for of in ["first", "second"] {
         delete_snapshot(at(&disk), &name(of)).unwrap();
@@ -394,9 +394,9 @@ fn something_else_in_place_of_the_folder_of_snapshots_is_damage_also_where_the_m
     disk.take(&folder);
     disk.put(&folder, b"no folder");
     let mut found = Vec::new();
-    let mut tell =
+    let mut note =
         |finding: &voxtile::integrity::Finding| found.push((finding.severity, finding.path.clone()));
-    verify(at(&disk), &mut tell, |_, _| ()).unwrap();
+    verify(at(&disk), &mut note, |_, _| ()).unwrap();
     assert_eq!(found, [(Severity::Damage, folder)]);
     repair(at(&disk), |_| (), |_, _| ()).unwrap();
     assert!(is_whole(&disk));
@@ -422,7 +422,7 @@ fn naive_diff(config: &MapConfig, a: &Voxels, b: &Voxels) -> BTreeMap<[i32; 3], 
 }
 
 #[test]
-fn a_diff_counts_what_a_naive_one_counts() {
+fn a_diff_equals_the_naive_diff() {
     let folder = TempDir::new().unwrap();
     let build = |map: &str, storage, seeds: std::ops::Range<u64>| {
         let path = folder.path().join(map);
@@ -456,14 +456,14 @@ fn a_diff_counts_what_a_naive_one_counts() {
         let Diff { tiles_appeared, tiles_gone, tiles_changed, tiles_equal, tiles_read, .. } =
             diff(from, to, |tile| found.push(tile), |_, _| ()).unwrap();
         let naive = naive_diff(from.config(), &voxels_of(from), &voxels_of(to));
-        let told: BTreeMap<_, _> = found
+        let reported: BTreeMap<_, _> = found
             .iter()
             .map(|tile| {
                 let v = tile.voxels;
                 (tile.tile, [v.appeared, v.gone, v.to_occupied, v.to_free, v.changed])
             })
             .collect();
-        assert_eq!(told, naive, "pair {number}");
+        assert_eq!(reported, naive, "pair {number}");
         let [before, after] = [from, to].map(|map| map.tile_indices());
         for tile in &found {
             let holds =
@@ -480,7 +480,7 @@ fn a_diff_counts_what_a_naive_one_counts() {
         if number < 4 {
             assert!(
                 tiles_read < naive.len() as u64 + tiles_equal || tiles_equal == 0,
-                "tiles are not read in vain"
+                "equal tiles must not be read"
             );
         }
     }
@@ -494,7 +494,7 @@ fn a_diff_counts_what_a_naive_one_counts() {
 /// Writing a hard-linked file through one name does not change the other.
 #[test]
 #[cfg(unix)]
-fn a_linked_file_that_is_created_anew_leaves_the_other_name_its_content() {
+fn creating_a_hard_linked_file_does_not_change_its_other_name() {
     let folder = TempDir::new().unwrap();
     let (a, b) = (folder.path().join("a"), folder.path().join("b"));
     let write = |path: &Path, text: &[u8]| FsDisk.create(path).unwrap().write_all(text).unwrap();
@@ -508,6 +508,6 @@ fn a_linked_file_that_is_created_anew_leaves_the_other_name_its_content() {
     assert_eq!(read(&b), b"kept");
     write(&b, b"new");
     assert_eq!((read(&a), read(&b)), (b"kept".to_vec(), b"new".to_vec()));
-    assert!(FsDisk.link(&a, &b).is_err(), "a name that something has is not taken");
+    assert!(FsDisk.link(&a, &b).is_err(), "a link must not replace an existing file");
     assert_eq!(FsDisk.kind(&a).unwrap(), Some(EntryKind::File(4)));
 }

@@ -184,7 +184,7 @@ fn a_long_running_reader_keeps_one_version_of_its_tables() {
     let now = reader.digest().unwrap();
     insert(31);
     assert!(kept_bytes(&path) <= reader.disk_bytes().unwrap().0);
-    assert_eq!(reader.digest().unwrap(), now, "with a writer that knows of the refresh");
+    assert_eq!(reader.digest().unwrap(), now, "a writer must keep the tables of the refreshed reader");
     reader.refresh().unwrap();
     insert(32);
     drop(reader);
@@ -400,7 +400,7 @@ fn inputs_with_long_names_and_many_skipped_scans() {
 }
 
 #[test]
-fn a_map_whose_metadata_has_grown_beyond_a_mebibyte_opens_and_its_next_flush_cuts_it() {
+fn metadata_of_more_than_1_mib_is_read_and_shortened_by_the_next_flush() {
     let folder = TempDir::new().unwrap();
     let path = map(&folder);
     let file = path.join("metadata.json");

@@ -43,7 +43,7 @@ fn assert_coarse_answers(mapper: &impl Mapper, reference: &ReferenceMap, depth: 
         let point_m = mapper.config().grid.center_m(node.map(|index| index << (16 - depth)));
         let answer = mapper.occupancy_at_depth(point_m, depth).unwrap().probability();
         if depth == 16 {
-            // At the finest depth, the exact voxel.
+            // At the finest depth the answer is that of the voxel itself.
             let exact = f64::from_bits(reference.voxels[&node].0);
             assert_eq!(answer, Some(voxtile::maths::sigmoid(exact)), "voxel {node:?}");
             continue;
@@ -69,7 +69,7 @@ fn drive(mapper: &mut impl Mapper, reference: &mut ReferenceMap, seed: u64) {
 }
 
 #[test]
-fn every_mode_gives_the_naive_map_and_its_maxima_whatever_the_threads_and_the_mapper() {
+fn every_mode_equals_the_naive_map_for_all_threads_and_mappers() {
     for threads in [1, 2, 4] {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         for (number, mode) in modes().into_iter().enumerate() {
@@ -173,7 +173,7 @@ fn live(seed: u64, mode: VoxelCacheMode) {
 }
 
 #[test]
-fn any_life_of_a_map_has_the_naive_maxima_at_every_moment() {
+fn random_lives_of_a_map_have_the_naive_maxima() {
     for (number, mode) in modes().into_iter().enumerate() {
         for seed in 0..4 {
             live(10 * number as u64 + seed, mode);
@@ -251,7 +251,7 @@ fn hits_misses_and_evictions_are_those_of_the_papers_stream_of_updates() {
 }
 
 #[test]
-fn without_a_cache_every_update_is_written_and_bricks_do_no_work_at_all() {
+fn without_a_cache_every_update_is_written_and_views_of_bricks_count_no_work() {
     for insert_mode in [InsertMode::PerScan, InsertMode::PerRay] {
         let config = config().with_insert_mode(insert_mode);
         let mut reference = ReferenceMap::new(&config);
@@ -274,7 +274,7 @@ fn without_a_cache_every_update_is_written_and_bricks_do_no_work_at_all() {
 }
 
 #[test]
-fn a_cache_without_a_size_holds_what_the_scans_of_its_tile_repeat() {
+fn a_cache_without_a_fixed_size_holds_the_voxels_that_scans_repeat() {
     let config = config().with_voxel_cache(VoxelCacheMode::Serial(VoxelCacheConfig::default()));
     let mut mapper = InMemoryMapper::new(config.clone()).unwrap();
     let mut random = Random(8);

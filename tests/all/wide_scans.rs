@@ -54,7 +54,7 @@ fn a_scan_with_more_updates_than_memory_is_inserted_completely() {
                 let point = scan.points[7];
                 mapper.occupancy_at(point).unwrap();
             }
-            assert!(in_files > 0, "{bytes} bytes: nothing was put in files");
+            assert!(in_files > 0, "{bytes} bytes: updates must be spilled to files");
             let digest = mapper.digest().unwrap();
             if expected.scan_number() as usize == scans.len() {
                 assert_eq!(digest, expected.digest().unwrap(), "{bytes} bytes");
@@ -119,7 +119,7 @@ fn a_wide_scan_that_fails_is_undone() {
             for scan in &scans[1..] {
                 mapper.insert_scan(scan).unwrap();
             }
-            assert_eq!(mapper.digest().unwrap(), digests[3], "crash at {at}, and on");
+            assert_eq!(mapper.digest().unwrap(), digests[3], "crash at {at}, then all other scans");
             continue;
         }
         refusals += usize::from(is_refused);

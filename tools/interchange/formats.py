@@ -160,7 +160,8 @@ def copc(scene):
         xyz = at(cloud)
         metadata = scene.same(xyz, cloud.log_odds, cloud["count"], cloud.intensity / 65535, tolerance=1e-5)
         coarse = [len(reader.query(level=level)) for level in range(3)]
-        # The coarsest level alone covers everything: each of its cells with a voxel has exactly one.
+        # The coarsest level alone covers the whole map: it has exactly one point in each of its cells that contains
+        # voxels.
         cell = reader.copc_info.spacing
         corner = np.array(reader.copc_info.center) - reader.copc_info.halfsize
         cells = np.unique(np.floor((xyz - corner) / cell).astype(int), axis=0)

@@ -1,4 +1,4 @@
-"""Records a drive without poses, and compares the maps with KISS-ICP's poses and true poses; see kiss_icp.sh.
+"""Records a drive without poses, and compares the map of KISS-ICP's poses with that of the true poses; see kiss_icp.sh.
 
     kiss_icp.py record STREAM FOLDER
     kiss_icp.py align TRUE_TUM FOUND_KITTI ALIGNED_TUM

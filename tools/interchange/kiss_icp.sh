@@ -36,7 +36,7 @@ tum=$work/kiss_icp/latest/drive_poses_tum.txt
 
 failed=0
 "$python" "$here/kiss_icp.py" align "$work/true_tum.txt" "$kitti" "$work/aligned_tum.txt" || failed=1
-# Poses 40 ms late, as if named by the log time of the recording: KISS-ICP uses log times.
+# Poses whose stamps are 40 ms late, like log times of a recording, which KISS-ICP uses as stamps.
 awk '{ $1 = sprintf("%.4f", $1 + 0.04); print }' "$tum" >"$work/late_tum.txt"
 
 map_with() { # poses, name

@@ -17,8 +17,8 @@ trap 'rm -rf "$work"' EXIT
 
 [ -n "${VOXTILE_BIN-}" ] || cargo build --release --quiet --example insert_stream --bin voxtile
 for tool in insert tiles merged; do
-    # Compiled without fused multiply-add, like Debian's library: it would visit slightly different voxels. The ray walk
-    # is in OctoMap's headers, so it is compiled here. NDEBUG silences it.
+    # Compiled without fused multiply-add, like Debian's library: with it, rays would visit slightly different voxels.
+    # The ray walk is in OctoMap's headers, so it is compiled here. NDEBUG disables the library's debug output.
     g++ -std=c++17 -O2 -DNDEBUG -ffp-contract=off -Wall -o "$work/$tool" "$here/$tool.cpp" -loctomap -loctomath
 done
 

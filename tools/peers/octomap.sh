@@ -19,8 +19,8 @@ octomap_contenders() {
     fi
 }
 
-# Compiled without fused multiply-add, like Debian's library: it would visit slightly different voxels. The ray walk and
-# the insertion are in OctoMap's headers, so both are compiled here.
+# Compiled without fused multiply-add, like Debian's library: with it, rays would visit slightly different voxels. The
+# ray walk and the insertion are in OctoMap's headers, so both are compiled here.
 compile() { # program, options
     local program=$target/peers/$1
     shift

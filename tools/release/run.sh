@@ -75,7 +75,7 @@ deb voxtile "out-of-core probabilistic 3D occupancy mapping" \
 memory does not: space is divided into tiles, an LRU cache keeps the active ones in memory." \
     bin/voxtile "share/man/man1/voxtile*" share/bash-completion share/zsh share/fish
 deb voxtile-share "occupancy map sharing between robots over Zenoh" \
-    "Runs as 'voxtile share': what one robot finds occupied reaches the others exactly, whatever the network loses." \
+    "Runs as 'voxtile share': sends the occupied voxels of a robot to other robots; lost packets are sent again." \
     bin/voxtile-share share/man/man1/voxtile-share.1
 
 tar --create --gzip --directory "$work" --sort=name --owner=0 --group=0 --numeric-owner --mtime="@$SOURCE_DATE_EPOCH" \

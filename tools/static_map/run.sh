@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Measures both rules of clearing on recorded data: surfaces kept, movers removed, CPU time of the build.
+# Measures both rules of clearing on recorded data: surfaces kept, moving objects removed, CPU time of the build.
 #
 #   tools/static_map/run.sh            all sets, and docs/measurements/clearing.md
 #   tools/static_map/run.sh --short    one set, and a table on standard output

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Measures how well a map keeps surfaces and lets go of movers.
+"""Measures how well a map keeps surfaces and removes moving objects.
 
     score.py SET MAP.npz RESOLUTION_M MAX_RANGE_M
 

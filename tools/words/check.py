@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Checks the wording of comments, documents and messages: words that ENGLISH readers stumble over here, and typos.
+"""Checks the wording of comments, documents and messages: words that readers may not understand, and typos.
 
     tools/words/check.py [FILE...]
 

@@ -24,8 +24,8 @@ use voxtile::{Error, Result};
 /// [`timeout`](Bucket::with_timeout) fails with [`Error::NoAnswer`]. Progress is an answer, or 16 KiB more of an
 /// object. An attempt without progress for half of the timeout is aborted and retried; a download continues at the byte
 /// reached. An upload has twice as much time. A request fails after 20 attempts in a row without progress, or after 4
-/// if the server was never reached. A wait of 8 seconds, or of a quarter of the timeout, is logged as a warning of the
-/// crate `log`. Every error names its object.
+/// if the server was never reached. A wait of 8 seconds, or of a quarter of the timeout if that is less, is logged as a
+/// warning of the crate `log`. Every error names its object.
 #[derive(Clone, Debug)]
 pub struct Bucket {
     /// URL as given by the user, for messages.
@@ -64,7 +64,7 @@ const TIMEOUT_VARIABLE: &str = "VOXTILE_BUCKET_TIMEOUT";
 /// Valid timeouts, in seconds.
 const TIMEOUTS_S: std::ops::RangeInclusive<f64> = 0.1..=86_400.0;
 
-/// For a store that does not count the bytes it sends, an upload has one timeout per this number of bytes.
+/// Bytes of an upload per timeout, for a store whose client does not count the bytes it sends.
 const UNCOUNTED_BYTES: u64 = 1 << 20;
 
 /// Remedy for a lost or damaged object, for messages.
@@ -285,8 +285,8 @@ impl Bucket {
     pub(super) fn put(&self, name: ObjectName, content: Bytes, checks_existing: bool) -> Pending<bool> {
         let (store, key) = (self.store.clone(), self.key(&name.key()));
         self.pending_put(&name.key(), content.len() as u64, move |request| async move {
-            // A name identifies its content, and an object exists as a whole or not at all. If the check is not
-            // permitted, the upload may still be.
+            // An object with this name and size is complete, because its name identifies its content. If the check is
+            // not permitted, the upload may still be.
             if checks_existing
                 && let Ok(existing) = request.query(async { Ok(store.head(&key).await?) }).await
                 && existing.size == content.len() as u64
@@ -348,8 +348,8 @@ impl Bucket {
                 Ok(_) => Ok(true),
                 Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(false),
                 Err(error) => {
-                    // Without the permission to list objects, stores do not report that an object is missing. A file at
-                    // the URL is not a map.
+                    // Without the permission to list objects, stores answer "permission denied" for a missing object.
+                    // If there is a file at the URL, it is not a map.
                     let is_file = error.kind() == io::ErrorKind::PermissionDenied
                         && !prefix.as_ref().is_empty()
                         && retry(&request, || async { Ok(store.head(&prefix).await?) })
@@ -447,7 +447,7 @@ impl Bucket {
     }
 }
 
-/// Bytes of progress per entry of a list, so that each page of a long list is progress.
+/// Number of bytes for which an entry of a list counts, so that each page of a long list is progress.
 const BYTES_OF_ENTRY: u64 = PROGRESS_BYTES;
 
 /// Reads the timeout from the environment.

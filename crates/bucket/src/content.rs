@@ -11,8 +11,8 @@ use std::ops::Range;
 /// Maximum number of downloads of an object whose content does not match its name: a proxy may have truncated it.
 const MAX_FETCHES: usize = 3;
 
-/// Fetches a whole object and compares it with its name. After a broken connection, it continues at the byte reached:
-/// the name detects parts that do not belong together.
+/// Fetches a whole object and compares it with its name. After a broken connection, the download continues at the byte
+/// reached: the name detects parts that do not belong together.
 pub(super) async fn fetch_whole(
     request: &Request,
     store: &dyn ObjectStore,
@@ -23,7 +23,7 @@ pub(super) async fn fetch_whole(
     for _ in 0..MAX_FETCHES {
         let mut fetch = Fetch { max_bytes, ..Fetch::new(None) };
         fetch.run(request, store, key).await?;
-        // Hashing on the network thread is short compared with the download.
+        // Hashed on the network thread, because this takes little time compared with the download.
         if ObjectName::of(&fetch.content) == name {
             return Ok(fetch.content.into());
         }
@@ -32,8 +32,8 @@ pub(super) async fn fetch_whole(
     Err(io::Error::new(io::ErrorKind::InvalidData, reason))
 }
 
-/// Fetches a range of bytes of an object. After a broken connection, it continues at the byte reached: an object never
-/// changes under its name, and checksums in the file detect damage.
+/// Fetches a range of bytes of an object. After a broken connection, the download continues at the byte reached: an
+/// object never changes under its name, and checksums in the file detect damage.
 pub(super) async fn fetch_bytes(
     request: &Request,
     store: &dyn ObjectStore,
@@ -138,7 +138,7 @@ async fn receive(
     if bytes > max_bytes {
         return Err(fatal(format!("object {key}: {bytes} bytes, but the maximum is {max_bytes}")));
     }
-    // A server may send more than it announced.
+    // The size is checked again while receiving, because a server may send more than it announced.
     let mut stream = found.into_stream();
     while let Some(chunk) = stream.try_next().await? {
         content.extend_from_slice(&chunk);

@@ -85,7 +85,7 @@ impl HttpService for CountingClient {
         Box::pin(async move {
             let counted = REQUEST.try_with(Arc::clone).ok();
             if let (Some(counted), Some(server)) = (&counted, request.uri().authority()) {
-                // Without a user name and password.
+                // The part after `@`, without a user name and password.
                 counted.set_server(server.as_str().rsplit('@').next().unwrap_or_default().to_owned());
             }
             let for_body = counted.clone();

@@ -106,7 +106,8 @@ impl FileFetch<'_> {
 }
 
 impl StoredObject {
-    /// Returns whether answers can be checked to be of the same version.
+    /// Returns whether the store reports an ETag or a modification time, by which answers are checked to be of the same
+    /// version.
     fn has_identity(&self) -> bool {
         self.e_tag.is_some() || self.modified_s != 0
     }

@@ -73,7 +73,7 @@ impl KnownStates {
             disk.sync_folder(folder)
         };
         write().map_err(|error| {
-            // The next attempt would overwrite it, but there may be none.
+            // Remove the temporary file: a later call would overwrite it, but there may be none.
             let _ = disk.remove_file(&next);
             Error::io(&path, "write", error)
         })

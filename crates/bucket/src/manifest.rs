@@ -47,7 +47,7 @@ pub(super) const MANIFEST: &str = "manifest.json";
 /// Size of a part, in bytes. When a file grows at its end, all parts but the last are unchanged.
 pub(super) const PART_BYTES: u64 = 16 << 20;
 
-/// Tiles along an edge of a page. A drive changes few pages.
+/// Tiles along an edge of a page. Pages are large, so that a drive changes few of them.
 const PAGE_TILES: i32 = 16;
 
 const FORMAT: &str = "voxtile bucket";

@@ -84,7 +84,7 @@ impl<T> Pending<T> {
         if let Some(task) = &self.task {
             task.abort();
         }
-        // Receives a late answer, or an error once the task has ended.
+        // Wait for a late answer, or for the error that reports the end of the task.
         let _ = self.answer.recv();
     }
 }

@@ -79,7 +79,7 @@ pub fn push(
         manifest = push.send_map(&map, &mut progress);
     }
     let manifest = manifest.map_err(|error| match error {
-        // Another request would wait as long.
+        // Do not check for another push: this request would also wait until its timeout.
         Error::NoAnswer { .. } | Error::Stopped => error,
         error => push.overtaken().unwrap_or(error),
     })?;
@@ -239,7 +239,7 @@ impl<'a> Push<'a> {
     }
 
     /// Writes the manifest, and records in the folder that the bucket has this state. Before the upload, the state is
-    /// recorded as offered: after an interruption, the next push recognizes it.
+    /// also recorded, as not yet in the bucket: after an interruption, the next push recognizes it.
     fn put(&mut self, map: &MapPath, manifest: &Manifest) -> Result<()> {
         let name = self.name_of(manifest)?;
         if self.before.as_ref() != Some(manifest) {

@@ -31,7 +31,7 @@ pub(super) fn remote_store(url: &str, scheme: &str, root: &str) -> Result<Option
 
 /// Chooses the cryptography library of rustls that the rest of voxtile uses.
 fn choose_tls() {
-    // An earlier choice of the program is kept.
+    // This fails if the program has already chosen a library. Its choice is kept.
     let _ = rustls::crypto::ring::default_provider().install_default();
 }
 
@@ -86,7 +86,7 @@ fn no_retries() -> RetryConfig {
     RetryConfig { max_retries: 0, retry_timeout: Duration::ZERO, ..RetryConfig::default() }
 }
 
-/// Returns whether a variable is set. A timeout of the environment has priority.
+/// Returns whether an environment variable is set. A timeout set there has priority.
 fn is_set(name: &str) -> bool {
     std::env::var_os(name).is_some()
 }

@@ -39,7 +39,7 @@ struct State {
     moved: u64,
     /// Maximum of `moved` over all attempts, in steps of [`PROGRESS_BYTES`].
     max_moved: u64,
-    /// `moved` and the time at the last progress or at the start of this attempt.
+    /// Value of `moved` and time, at the last progress or at the start of this attempt.
     last_progress: (u64, Instant),
     /// Idle time of earlier attempts and the pauses between them since the last progress.
     idle: Duration,
@@ -118,7 +118,7 @@ impl Request {
         self.state.lock().attempts += 1;
         let outcome = self.run(kept, attempt).await;
         if outcome.is_ok() {
-            // A large file needs several ranges, each with its own attempts.
+            // Attempts are counted for each range of a large file anew.
             self.state.lock().attempts = 0;
         }
         outcome
@@ -171,7 +171,7 @@ impl Request {
     ///
     /// # Errors
     ///
-    /// The failure, if another attempt cannot help; [`Error::NoAnswer`] as the cause at the limit.
+    /// The failure, if another attempt cannot help; [`Error::NoAnswer`] as the cause if a limit is reached.
     pub(super) async fn retry_after(&self, failure: Failure) -> io::Result<()> {
         let reason = match failure {
             Failure::Fatal(error) => return Err(error),

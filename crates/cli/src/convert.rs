@@ -34,7 +34,7 @@ struct Form<'a> {
     #[serde(serialize_with = "voxtile::path_text::serialize")]
     map: &'a Path,
     storage: Storage,
-    /// `None` for a map of the original format, which does not record it.
+    /// Size in bytes; `None` for a map of the original format, which does not record sizes.
     table_bytes: Option<u64>,
     octree_bytes: Option<u64>,
 }

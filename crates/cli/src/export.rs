@@ -15,7 +15,8 @@ use voxtile_pipeline::{
     ExportOptions, ExportSummary, ExportedScans, POSES_NAME, WhichVoxels, Written, export, export_scans,
 };
 
-/// Writes the file and prints a summary unless `is_quiet`, on standard error if the file is standard output.
+/// Writes the file and prints a summary, to standard error if the file is standard output. `is_quiet` suppresses the
+/// summary.
 pub fn run(args: &ExportArgs, is_quiet: bool) -> anyhow::Result<ExitCode> {
     let watch = at_terminal(stop_signal::catch_unfinished()?);
     if let Some(folder) = &args.scans {

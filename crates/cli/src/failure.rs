@@ -107,8 +107,8 @@ impl<'a> Failure<'a> {
     }
 }
 
-/// Returns the error with its causes and with options in place of field names. A bare I/O error concerns standard
-/// output, because errors of files and programs contain their names.
+/// Returns the error with its causes and with options in place of field names. An I/O error without context is about
+/// standard output: errors of files and programs have their name as context.
 pub fn message_of(error: &anyhow::Error) -> String {
     if let Some(error) = error.chain().next().and_then(|first| first.downcast_ref::<io::Error>()) {
         return format!("standard output: cannot write: {error}");
@@ -136,8 +136,8 @@ fn exit_code_of(error: Option<&Error>) -> ExitCode {
     }
 }
 
-/// Returns whether the reader of standard output is gone, as in `voxtile ... | head`. Errors of other pipes name their
-/// file.
+/// Returns whether the reader of standard output is gone, as in `voxtile ... | head`. A broken pipe inside an [`Error`]
+/// belongs to another file and does not count.
 fn is_closed_pipe(error: &anyhow::Error) -> bool {
     error
         .chain()

@@ -26,7 +26,7 @@ pub struct Info {
     pub tile_size_m: f64,
     pub sensor_model: SensorModel,
     pub occupancy_threshold: f64,
-    /// Rule for the voxels that rays pass.
+    /// Rule for the misses of rays.
     pub clearing: Clearing,
     pub storage: Storage,
     pub scan_number: u64,
@@ -36,7 +36,7 @@ pub struct Info {
     /// Number of the last scan at the latest decay; 0 without decay.
     pub decayed_scan: u64,
     pub tiles: u64,
-    /// Mapped tiles; absent if the region is all of space.
+    /// Tiles of the region that the map is limited to; absent if the map is not limited.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub region_tiles: Option<TileBox>,
     pub tile_bounds: Option<Bounds>,

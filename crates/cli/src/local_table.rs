@@ -3,7 +3,7 @@ use std::io::{self, Write};
 use std::time::Duration;
 use voxtile_local::{LocalMap, LocalParameters, LocalReport, StageTimes};
 
-/// Results of a run of scans through a map, with the terms of the voxel mapping paper.
+/// Results of inserting scans into a local map. The fields have the names of the voxel mapping paper.
 #[derive(Debug, Serialize)]
 pub struct Row {
     pub setup: &'static str,
@@ -56,7 +56,7 @@ pub struct Stages {
     pub publishing: f64,
 }
 
-/// Number of scans between two measurements of memory, which visit the whole map.
+/// Number of scans between two measurements of memory. Each measurement visits the whole map.
 const COUNT_EVERY: u64 = 16;
 
 impl Row {
@@ -172,7 +172,8 @@ impl Row {
         )?;
         let points = self.points as f64 / self.scans.max(1) as f64;
         let scans = self.scans;
-        writeln!(out, "{scans} scans, {points:.0} points each; m, ms an update (t_cpu, p99: processor time)")
+        let units = "lengths in m, times in ms per update (t_cpu, p99: processor time)";
+        writeln!(out, "{scans} scans, {points:.0} points each; {units}")
     }
 }
 
@@ -188,7 +189,7 @@ impl Stages {
         }
     }
 
-    /// Combines each stage of both with `join`.
+    /// Applies `join` to the two values of each stage.
     fn with(&self, other: &Self, join: impl Fn(f64, f64) -> f64) -> Self {
         Self {
             input: join(self.input, other.input),
@@ -219,7 +220,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn of_two_runs_each_update_has_the_least_times() {
+    fn take_minimum_keeps_the_shorter_time_of_each_update() {
         let row = |times: [f64; 2]| {
             let mut row = Row::new("a", &LocalParameters::local_mapping());
             let of =
@@ -235,7 +236,7 @@ mod tests {
     }
 
     #[test]
-    fn of_a_hundred_values_the_99th_is_p99() {
+    fn p99_is_the_99th_of_100_values() {
         let mut values: Vec<f64> = (1..=100).rev().map(f64::from).collect();
         let Distribution { mean, p99, max } = Distribution::of(&mut values);
         assert_eq!((mean, p99, max), (50.5, 99.0, 100.0));

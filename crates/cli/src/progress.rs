@@ -30,7 +30,7 @@ pub fn at_terminal(stop: Stop) -> Watch {
 /// The latest bar, if it still exists.
 static SHOWN: Mutex<Option<ProgressBar>> = Mutex::new(None);
 
-/// Standard error of the log: writes above the bar, with field names replaced by options.
+/// Log output on standard error: writes above the progress bar and replaces field names by options.
 pub struct AboveBar;
 
 impl Write for AboveBar {
@@ -97,7 +97,7 @@ impl Progress {
         self.bar.suspend(|| writeln!(std::io::stdout(), "{line}").unwrap_or_default());
     }
 
-    /// Shows the mapper's tiles and memory, a few times a second at most.
+    /// Shows the mapper's tiles and memory, after every eighth scan.
     pub fn show(&self, statistics: &dyn Fn() -> MapStatistics) {
         if self.bar.is_hidden() || !self.bar.position().is_multiple_of(8) {
             return;

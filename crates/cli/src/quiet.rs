@@ -15,7 +15,8 @@ pub fn is_quiet() -> bool {
     IS_QUIET.load(Ordering::Relaxed)
 }
 
-/// Returns standard output for a summary, or a sink with `--quiet`, unless the summary `is_requested`, such as JSON.
+/// Returns standard output, or a sink with `--quiet`. With `is_requested`, as for JSON, returns standard output in any
+/// case.
 pub fn summary_out(is_requested: bool) -> Box<dyn Write> {
     if is_requested || !is_quiet() { Box::new(stdout().lock()) } else { Box::new(sink()) }
 }

@@ -29,7 +29,7 @@ impl Job {
         Ok(Self { replay, progress: Progress::over_scans(Some(0)), stop })
     }
 
-    /// Maps a requested stop to its exit code; the map has not changed.
+    /// Returns the exit code if a signal stopped the replay, after a message that the map has not changed.
     pub fn ended<T>(&self, outcome: voxtile::Result<T>) -> anyhow::Result<Result<T, ExitCode>> {
         match outcome {
             Err(voxtile::Error::Stopped) if self.stop.is_set() => {
@@ -41,7 +41,7 @@ impl Job {
     }
 }
 
-/// Prints two lines on replayed scans and tiles.
+/// Prints how many scans and tiles were or would be replayed, and the expected time of a dry run.
 pub fn print(mapped: &Replayed, is_dry_run: bool, out: &mut impl Write) -> std::io::Result<()> {
     let Replayed { scans, scans_changed, scans_mapped, tiles, tiles_mapped, updates, updates_mapped, .. } =
         *mapped;

@@ -49,7 +49,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
         quiet::be_quiet();
     }
     if keeps_to_bytes(&command) {
-        // Before the second thread starts and before standard input is read.
+        // Must precede the start of other threads and the first read of standard input.
         begin_with_one_heap();
     }
     if is_parallel(&command)
@@ -126,7 +126,7 @@ fn with_plain_numbers(arguments: impl IntoIterator<Item = OsString>) -> Vec<OsSt
     arguments.into_iter().map(plain).collect()
 }
 
-/// Returns a negative number in plain digits if it has another form.
+/// Rewrites a negative number in plain digits; `None` if the text needs no rewriting.
 fn plain_number(text: &str) -> Option<String> {
     let digits = text.strip_prefix('-')?;
     if digits.bytes().all(|byte| byte.is_ascii_digit()) {

@@ -77,7 +77,7 @@ fn is_map(path: &Path) -> voxtile::Result<bool> {
 }
 
 fn of_map(args: &ScansArgs, out: &mut impl Write) -> anyhow::Result<Overview> {
-    // An attempt may fail and be repeated: print only after it succeeds.
+    // `read_map` may repeat this closure after a failure: print only after it succeeds.
     let (overview, mut rows) = read_map(&args.data, |reader| {
         let mut rows = BufWriter::new(SpooledTempFile::new(ROWS_BYTES));
         let overview = listed(reader, args, &mut rows)?;

@@ -7,8 +7,8 @@ use std::thread::{self, available_parallelism};
 /// Starts the mapping threads: `count`, or one per core, or as many as the system allows. If it allows none, the
 /// current thread does all the work.
 ///
-/// Threads start before the pool is built: if a pool fails to start a thread itself, it is unusable for the rest of the
-/// process.
+/// The threads start before rayon's pool is built. If rayon itself failed to start a thread, its pool would be unusable
+/// for the rest of the process.
 pub fn start(count: Option<u16>) -> anyhow::Result<()> {
     let wanted = count.map_or_else(default_threads, usize::from);
     let mut waiting: Vec<Sender<rayon::ThreadBuilder>> = Vec::new();

@@ -127,8 +127,8 @@ impl Registry {
                 counts.entry(format.name).or_insert((format, file, 0_u64)).2 += 1;
             }
         }
-        // Lists, time stamps, poses and pictures often accompany clouds. If there are only pictures and text clouds,
-        // the pictures are the input if camera intrinsics are known.
+        // Text files and pictures often accompany clouds, so their formats are removed while others are present. If
+        // only text files and pictures remain, the pictures are the input if camera intrinsics are known.
         let mut aside: Vec<&str> =
             self.formats().iter().filter(|format| format.is_aside).map(|format| format.name).collect();
         if !listing.has_depths() {

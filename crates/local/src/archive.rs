@@ -9,7 +9,7 @@ use voxtile::scan::{Scan, ScanPoints, ScanReport};
 use voxtile::space::{Aabb, Point, VoxelIndex};
 use voxtile::{Error, Result};
 
-/// The combined answer of a local map and an archive.
+/// Combined answer of a local map and an archive, which is a map of all scans.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum LocalAnswer {
     /// Occupied in the local map, or in the archive if the local map has removed the voxel.
@@ -45,13 +45,13 @@ impl LocalMap {
     /// Copies the occupied voxels of an archive within `radius_m` metres of `position`, for a robot that returns to a
     /// known place. Returns the number of new voxels.
     ///
-    /// Evidence from scans is kept. Copied voxels count as older than all of it, the nearest ones as the youngest of
-    /// them. The limit on voxels applies.
+    /// Existing voxels keep their evidence. Copied voxels are placed before all existing voxels in the history, so they
+    /// are removed first, the farthest before the nearest. The limit on voxels applies.
     ///
     /// # Errors
     ///
-    /// If a tile cannot be read, the resolutions differ, the position has no voxel or the radius is invalid. The map is
-    /// then unchanged.
+    /// If a tile cannot be read, the resolutions differ, the position is not finite or outside of the range of voxel
+    /// indices, or the radius is invalid. The map is then unchanged.
     pub fn prime(
         &mut self,
         archive: &(impl MapView + Sized),
@@ -98,8 +98,8 @@ impl LocalMap {
         Ok(found)
     }
 
-    /// Adds a voxel at the start of the history unless the map has it already or its own thresholds classify it as
-    /// free.
+    /// Adds a voxel at the start of the history. Returns `false` if the map already has the voxel, or if the thresholds
+    /// of the map classify it as free.
     fn add_oldest(&mut self, voxel: VoxelIndex, log_odds: f64) -> bool {
         let limits = self.applied.log_odds;
         let log_odds = log_odds.clamp(limits.min, limits.max);
@@ -121,7 +121,7 @@ impl LocalMap {
     }
 }
 
-/// An archive and a local map that are updated with the same scans.
+/// Archive (a map of all scans) and local map that are updated with the same scans.
 #[derive(Debug)]
 pub struct WithLocalMap<M> {
     archive: M,

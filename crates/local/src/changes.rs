@@ -63,7 +63,7 @@ fn compare_nodes(
 fn compare_blocks(index: VoxelIndex, before: BlockView, after: BlockView, changes: &mut Vec<VoxelChange>) {
     for place in ones((before.occupied ^ after.occupied) | (before.inflated ^ after.inflated)) {
         let (before, after) = (before.state(place), after.state(place));
-        // Equal states: an occupied voxel's inflation may have changed.
+        // The states may be equal, because only the inflation of an occupied voxel may have changed.
         if before != after {
             changes.push(VoxelChange { voxel: cell_at(index, place), before, after });
         }

@@ -6,11 +6,11 @@ use super::runs::Runs;
 /// a mask is a carry across the planes. A block has as many planes as its largest count needs, usually two or three.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Counts {
-    /// Indexed by the number of planes: the mask of inflating voxels, then the planes.
+    /// Runs with 0, 1, 2 .. planes. A run contains the mask of inflating voxels, then the planes.
     runs: [Runs<u64>; MAX_PLANES + 1],
 }
 
-/// Position of the counts of a block; no planes if nothing is inflated.
+/// Position of the counts of a block in [`Counts`]. Without inflated voxels, the block has no planes.
 // Packed, so that a block fits into 32 bytes.
 #[derive(Clone, Copy, Debug, Default)]
 #[repr(Rust, packed)]
@@ -63,7 +63,7 @@ impl Counts {
         }
     }
 
-    /// Adds one to the counts of a non-empty mask; returns the voxels that were not inflated before.
+    /// Adds one to the counts of the voxels in a non-empty mask; returns the voxels that were not inflated before.
     #[inline]
     pub(super) fn add(&mut self, tally: &mut Tally, mask: u64) -> u64 {
         if tally.is_empty() {
@@ -93,7 +93,8 @@ impl Counts {
         self.words_mut(*tally).copy_from_slice(&words[..planes + 2]);
     }
 
-    /// Subtracts one from the counts of a mask, none of which is 0; returns the voxels that are no longer inflated.
+    /// Subtracts one from the counts of the voxels in a mask, none of which is 0; returns the voxels that are no longer
+    /// inflated.
     #[inline]
     pub(super) fn subtract(&mut self, tally: &mut Tally, mask: u64) -> u64 {
         let (mut borrow, mut after) = (mask, 0);

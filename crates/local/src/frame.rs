@@ -9,7 +9,7 @@ use voxtile::maths::logit;
 use voxtile::scan::MAX_RAY_STEPS;
 use voxtile::space::{Grid, Point, VoxelIndex};
 
-/// Evidence of the current scan (the paper's task buffers).
+/// Evidence of the current scan (the task buffers of the paper by La, Kang and Lee).
 #[derive(Debug, Default)]
 pub(super) struct Frame {
     /// Voxels with evidence, in order of arrival.
@@ -27,7 +27,7 @@ struct Touch {
     voxel: u32,
     hits: u32,
     misses: u32,
-    /// Whether the voxel is new in the map (`B_new`) or existed before (`B_keep`).
+    /// Whether the voxel is new in the map (`B_new` in the paper) or existed before (`B_keep`).
     is_new: bool,
     is_free: bool,
 }
@@ -53,7 +53,7 @@ impl Frame {
     }
 }
 
-/// Stages of an update before the inflation.
+/// Stages of an update before the inflation. Algorithms and equations are those of the paper by La, Kang and Lee.
 impl LocalMap {
     /// Input update (Algorithm 1, lines 2 to 19): adds a hit to the voxel of each point that is not skipped.
     pub(super) fn take_hits(
@@ -64,7 +64,7 @@ impl LocalMap {
         report: &mut LocalReport,
     ) {
         self.frame.counting.clear();
-        // Neighbouring points are often in the same block.
+        // The last block is remembered, because neighbouring points are often in the same block.
         let mut last_block = None;
         for (number, &point) in points.iter().enumerate() {
             let Some(voxel) = self.voxel_of_used_point(origin, start, point, report) else { continue };
@@ -174,7 +174,8 @@ impl LocalMap {
         }
         self.frame.touches = touches;
         self.frame.touches.clear();
-        // Each new voxel may displace an old one; a lowered limit is applied over several updates.
+        // Every new voxel may displace an old one. Beyond that, the number of removals is limited: a lowered limit is
+        // applied over several updates.
         let most = self.applied.work_per_update.saturating_add(report.new as usize);
         for _ in 0..most {
             let Some(oldest) = self.voxels.oldest().filter(|_| self.is_over_limit()) else { break };

@@ -18,7 +18,7 @@ pub(super) struct Inflation {
     waiting: Vec<u32>,
     /// Blocks to check for removal.
     emptied: Vec<u32>,
-    /// Numbers of the blocks around the current one, indexed like its stencil.
+    /// Numbers of the blocks around the current block, in the order of [`Stencil::offset_of`].
     affected: Vec<u32>,
     nodes: NodesAround,
     pages: Vec<u32>,
@@ -130,7 +130,7 @@ impl Inflation {
             Relation::Outside if inflating == 0 => return,
             _ => {}
         }
-        // Blocks added in this loop contain no inflating voxels.
+        // Blocks that this loop adds are not visited: they have no occupied voxels, which alone can inflate others.
         for place in ones(tree.nodes.get(node).blocks.mask) {
             if let Some(block) = tree.nodes.get(node).blocks.get(&tree.lists, place) {
                 self.reconcile(tree, block, &ball, relation);
@@ -138,7 +138,8 @@ impl Inflation {
         }
     }
 
-    /// Recomputes which voxels of a block inflate others. `relation` is that of a cube that contains the block.
+    /// Recomputes which voxels of a block inflate others. `relation` is the position of a cube that contains the block,
+    /// relative to `ball`.
     fn reconcile(&mut self, tree: &mut Tree, block: u32, ball: &Ball, relation: Relation) {
         let (occupied, inflating) = {
             let block = tree.blocks.get(block);
@@ -163,7 +164,7 @@ impl Inflation {
         }
     }
 
-    /// Starts and stops the inflation by the voxels of a block.
+    /// Starts the inflation by the voxels `begin` of a block, and stops the inflation by its voxels `end`.
     fn change(&mut self, tree: &mut Tree, block: u32, begin: u64, end: u64, stencil: &Stencil) {
         self.affected.clear();
         self.affected.resize(stencil.blocks(), NONE);

@@ -19,7 +19,7 @@ use voxtile::{Error, Result};
 #[derive(Debug)]
 pub struct LocalMap {
     pub(super) grid: Grid,
-    /// Parameters requested by the user.
+    /// Parameters of the next update.
     parameters: LocalParameters,
     /// Parameters of the last update.
     pub(super) applied: LocalParameters,
@@ -35,7 +35,7 @@ pub struct LocalMap {
     view: Arc<LocalView>,
 }
 
-/// Voxel indices close to the limits of `i32` have no neighbours to inflate.
+/// Largest absolute voxel index in the map. Closer to the limits of `i32`, the voxels to inflate would have no index.
 const MAX_INDEX: i32 = i32::MAX - (1 << 12);
 
 impl LocalMap {
@@ -92,8 +92,8 @@ impl LocalMap {
     ///
     /// # Errors
     ///
-    /// If the origin has no voxel, a point cannot be read, or voxels and points exceed 67 million. The map is then
-    /// unchanged.
+    /// If the origin is not finite or outside of the range of voxel indices, a point cannot be read, or voxels and
+    /// points exceed 67 million. The map is then unchanged.
     pub fn insert_points(&mut self, scan: &dyn ScanPoints) -> Result<LocalReport> {
         self.insert_after(scan, || Ok(())).map(|(report, ())| report)
     }
@@ -127,7 +127,8 @@ impl LocalMap {
     ///
     /// # Errors
     ///
-    /// If the position has no voxel, or voxels and points exceed 67 million. The map is then unchanged.
+    /// If the position is not finite or outside of the range of voxel indices, or voxels and points exceed 67 million.
+    /// The map is then unchanged.
     pub fn insert_relayed(&mut self, position: Point, points: &[Point]) -> Result<LocalReport> {
         self.update(position, points, false)
     }
@@ -193,8 +194,8 @@ impl LocalMap {
         if self.parameters != self.applied {
             let before = std::mem::replace(&mut self.applied, self.parameters);
             if !self.inflation.rules.has_free_number() {
-                // All rule numbers are in use by earlier ranges and radii that are not applied everywhere yet. This one
-                // waits until a number is free.
+                // All rule numbers are in use by earlier ranges and radii that are not yet applied to the whole map.
+                // The new range and radius are applied when a number is free.
                 self.applied.inflation_range_m = before.inflation_range_m;
                 self.applied.inflation_radius_m = before.inflation_radius_m;
             }
@@ -233,7 +234,7 @@ impl LocalMap {
         LocalReader::new(self.shared.clone())
     }
 
-    /// Returns the number of voxels with occupancy (`n_occ`): occupied, or not yet known to be free.
+    /// Returns the number of stored voxels (`n_occ`): occupied, or not yet known to be free.
     pub fn stored_voxels(&self) -> usize {
         self.voxels.len()
     }
@@ -243,12 +244,12 @@ impl LocalMap {
         self.inflation.inflated
     }
 
-    /// Returns the number of voxels in the occupancy or the inflation map; visits all of them.
+    /// Returns the number of voxels that are stored or inflated; visits all of them.
     pub fn voxels(&self) -> usize {
         self.inflation.inflated + self.tree.stored_but_not_inflated()
     }
 
-    /// Returns each voxel with occupancy and its log-odds in the order of removal: the least recently updated first.
+    /// Returns each stored voxel and its log-odds in the order of removal: the least recently updated first.
     pub fn history(&self) -> impl Iterator<Item = (VoxelIndex, f64)> + '_ {
         self.voxels.in_order().map(|voxel| {
             let (block, place) = voxel.home();

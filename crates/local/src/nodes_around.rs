@@ -52,7 +52,7 @@ mod tests {
         let mut around = NodesAround::default();
         for center in [[0; 3], [-1, 4, -4], [-1, 3, -4], [0; 3]] {
             around.move_to(center);
-            // Twice: the first round creates nodes, the second finds them.
+            // Each node is requested twice: the first request creates it, the second finds it.
             for number in (0..125).chain(0..125) {
                 let offset = [number % 5 - 2, number / 5 % 5 - 2, number / 25 - 2];
                 let index: VoxelIndex = std::array::from_fn(|k| center[k] + offset[k]);

@@ -41,12 +41,12 @@ impl PageTable {
     fn place(&self, index: VoxelIndex) -> Option<usize> {
         let [x, y, z]: [u32; 3] = std::array::from_fn(|k| index[k].wrapping_sub(self.min[k]) as u32);
         let [width, height, depth] = self.size;
-        // Overflows only for boxes too large to tabulate; those use the tree.
+        // This overflows only for boxes that are too large for the table; their pages are looked up in the tree.
         let place = x.wrapping_mul(height).wrapping_add(y).wrapping_mul(depth).wrapping_add(z);
         (x < width && y < height && z < depth).then_some(place as usize)
     }
 
-    /// Returns the page with an index if it holds voxels with occupancy.
+    /// Returns the page with an index if it has stored voxels.
     #[inline]
     pub(super) fn get(&self, tree: &Tree, index: VoxelIndex) -> Option<u32> {
         let place = self.place(index)?;

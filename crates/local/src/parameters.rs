@@ -5,7 +5,7 @@ use voxtile::{Error, Result};
 
 /// Parameters of a local map. All of them can change at runtime, from the next update on.
 ///
-/// Names in parentheses are those of the paper.
+/// Names in parentheses are those of the paper by La, Kang and Lee.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 #[non_exhaustive]
 pub struct LocalParameters {
@@ -17,8 +17,8 @@ pub struct LocalParameters {
     pub occupied_log_odds: f64,
     /// Highest log-odds of a voxel known to be free, which is removed (`l_free`). Default: logit(0.4).
     pub free_log_odds: f64,
-    /// Maximum number of voxels with occupancy (`n_lim`); beyond it, the least recently updated are removed. `None`: no
-    /// limit.
+    /// Maximum number of stored voxels (`n_lim`), which are occupied or not yet known to be free. Beyond it, the least
+    /// recently updated ones are removed. `None`: no limit.
     pub max_voxels: Option<usize>,
     /// Points nearer to the sensor than this, in metres, are skipped. Default: 0.
     pub min_input_range_m: f64,
@@ -112,7 +112,7 @@ impl LocalParameters {
             ("input range", self.input_range_m),
             ("inflation range", self.inflation_range_m),
         ];
-        // Would skip every point.
+        // An infinite minimum range would skip every point.
         if self.min_input_range_m == f64::INFINITY {
             return wrong("minimum input range", f64::INFINITY, "a finite length");
         }

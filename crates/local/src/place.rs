@@ -32,8 +32,8 @@ pub(super) fn mirrored(mut mask: u64, flip: usize) -> u64 {
     mask
 }
 
-/// Returns the mask of a box, given by the first and the last of 0 to 3 along each axis; empty if a first exceeds its
-/// last.
+/// Returns the mask of a box, given by its first and last index (0 to 3) along each axis. The mask is empty if a first
+/// index exceeds the last one.
 #[inline]
 pub(super) fn in_box(x: (usize, usize), y: (usize, usize), z: (usize, usize)) -> u64 {
     RANGES[0][x.0][x.1] & RANGES[1][y.0][y.1] & RANGES[2][z.0][z.1]

@@ -68,7 +68,8 @@ impl LocalView {
         LocalObstacles { view: self, obstacle }
     }
 
-    /// Returns the largest empty cell around a voxel.
+    /// Returns the cell of the missing page, node or block that contains a voxel. `None` if the block of the voxel
+    /// exists.
     fn empty_around(&self, voxel: VoxelIndex) -> Option<VoxelBox> {
         let cell = |shift: u32| {
             let min = voxel.map(|k| k >> shift << shift);

@@ -5,7 +5,7 @@ use super::tree::{Node, Page, Tree};
 use voxtile::scan::RayWalk;
 use voxtile::space::{Point, VoxelIndex};
 
-/// Finds the voxels with occupancy on a ray: exactly those that [`RayWalk`] visits before its last voxel.
+/// Finds the stored voxels on a ray: exactly those that [`RayWalk`] visits before its last voxel.
 ///
 /// A ray crosses voxel borders in the order of their times, at equal times the lowest axis first. So it visits a voxel
 /// if and only if it crosses all borders into it before any border out of it. The same holds for larger cells, whose
@@ -57,7 +57,7 @@ impl RaySearch {
         }
     }
 
-    /// Visits the number of each voxel with occupancy on the ray in order, excluding the last voxel.
+    /// Visits the number of each stored voxel on the ray in order, excluding the last voxel.
     #[inline]
     pub(super) fn for_each_stored(
         &self,
@@ -116,8 +116,8 @@ impl RaySearch {
         });
     }
 
-    /// Returns the mask of the block of the ray's end if it is in the node and holds only the end; skipping it saves
-    /// most rays the descent.
+    /// Returns the mask of the block that contains the ray's end, or 0 if the block has other stored voxels. Without
+    /// other voxels the block need not be searched, because the end is not visited.
     #[inline]
     fn block_of_end_alone(&self, tree: &Tree, node: &Node) -> u64 {
         let place = place_of(self.last.map(|k| k >> 2));
@@ -157,7 +157,7 @@ impl RaySearch {
         if mask == 0 {
             return;
         }
-        // No branch per cell: it would be unpredictable.
+        // There is no branch per cell, because it would be unpredictable.
         let (mut near, mut visited) = (mask & self.near::<SHIFT>(parent, stay), 0_u64);
         while near != 0 {
             let place = near.trailing_zeros() as usize;
@@ -180,7 +180,7 @@ impl RaySearch {
     /// of the ray's ends.
     #[inline]
     fn near<const SHIFT: u32>(&self, parent: VoxelIndex, stay: Stay) -> u64 {
-        // In voxels; the rounding error of times and positions is at most a thousandth of this.
+        // Margin in voxels. The rounding error of times and positions is at most a thousandth of it.
         const MARGIN: f64 = 1e-3;
         let cells_per_voxel = 1.0 / f64::from(1 << SHIFT);
         let leave = if stay.leave < 1.0 { stay.leave } else { 1.0 };
@@ -249,7 +249,7 @@ fn earliest([x, y, z]: Point) -> (usize, f64) {
     }
 }
 
-// One instruction each; the standard library's versions handle NaN.
+// Unlike `f64::min` and `f64::max`, these functions have no special case for NaN, so each is one instruction.
 #[inline]
 fn smaller(a: f64, b: f64) -> f64 {
     if a < b { a } else { b }

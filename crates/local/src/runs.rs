@@ -16,7 +16,7 @@ impl<T: Copy + Default> Runs<T> {
     pub(super) fn take(&mut self, len: usize) -> u32 {
         self.free.pop().unwrap_or_else(|| {
             let used = self.values.len();
-            // Doubling would leave a third of the capacity unused on average.
+            // The capacity grows by an eighth. Doubling would leave a third of it unused on average.
             if self.values.capacity() < used + len {
                 self.values.reserve_exact(used / 8 + 1024);
             }

@@ -47,7 +47,8 @@ impl Stencil {
         self.offsets.len()
     }
 
-    /// Returns the blocks and the masks that the voxel at a position of its block inflates.
+    /// Returns the blocks with voxels that the voxel at a position of its block inflates, and the masks of these
+    /// voxels.
     #[inline]
     pub(super) fn of_place(&self, place: usize) -> &[(u32, u64)] {
         &self.parts[place]
@@ -86,7 +87,7 @@ mod tests {
 
     #[test]
     fn balls_have_the_expected_number_of_voxels() {
-        // 0.3 m is slightly less than three voxels of 0.1 m in f64.
+        // 0.3 m, for example, is slightly less than three voxels of 0.1 m in `f64`, but must give three voxels.
         let sizes = [(0.0, 1), (0.1, 7), (0.2, 33), (0.3, 123), (0.25, 81), (0.4, 257), (2.4, 57_777)];
         for (radius_m, size) in sizes {
             let stencil = Stencil::new(radius_m, 0.1);

@@ -99,7 +99,7 @@ impl LocalMap {
         }
         let before = self.inflation.changes;
         self.inflation.adopt(&mut self.tree, node);
-        // Voxels that stopped inflating start again with the new stencil.
+        // Counted twice: voxels that have stopped inflating will start again with the new stencil.
         work + 2 * (self.inflation.changes - before)
     }
 }

@@ -30,7 +30,7 @@ pub(super) struct Page {
     /// Index of any of its voxels, divided by 64.
     pub(super) index: VoxelIndex,
     pub(super) nodes: Sparse64,
-    /// Mask of nodes that hold voxels with occupancy.
+    /// Mask of nodes that have stored voxels.
     pub(super) stored: u64,
     /// Mask of nodes in which voxels changed since the last publication.
     pub(super) dirty: u64,
@@ -52,20 +52,20 @@ pub(super) struct Node {
     /// Number of voxels that inflate others.
     pub(super) inflating: u16,
     pub(super) blocks: Sparse64,
-    /// Mask of blocks that hold voxels with occupancy.
+    /// Mask of blocks that have stored voxels.
     pub(super) stored: u64,
     /// Mask of blocks in which voxels changed since the last publication.
     pub(super) dirty: u64,
 }
 
-/// A cube of 4 x 4 x 4 voxels, each with its occupancy and inflation. Fills half a cache line.
+/// A cube of 4 x 4 x 4 voxels, with their states and inflation counts. Fills half a cache line.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Block {
     pub(super) node: u32,
     pub(super) place: u8,
     /// Whether the block is queued for an update of the inflation.
     pub(super) is_waiting: bool,
-    /// The voxels with occupancy, and their numbers.
+    /// The stored voxels, and their numbers.
     pub(super) voxels: Sparse64,
     pub(super) occupied: u64,
     /// Mask of the occupied voxels that inflate others, and the counts of inflation.
@@ -143,7 +143,7 @@ impl Tree {
 
     #[inline]
     fn make_page(&mut self, index: VoxelIndex) -> u32 {
-        // Usually the page of the last block.
+        // Usually the block is in the same page as the last one.
         if let Some((last, page)) = self.last_page
             && last == index
         {
@@ -158,7 +158,7 @@ impl Tree {
         page
     }
 
-    /// Adds a voxel with occupancy to a block.
+    /// Adds a stored voxel to a block.
     pub(super) fn store(&mut self, block: u32, place: usize, voxel: u32) {
         let Block { node, place: in_node, voxels, .. } = self.blocks.get_mut(block);
         voxels.insert(&mut self.lists, place, voxel);
@@ -167,7 +167,7 @@ impl Tree {
         self.pages.get_mut(*page).stored |= 1 << *in_page;
     }
 
-    /// Removes a voxel with occupancy from a block.
+    /// Removes a stored voxel from a block.
     pub(super) fn unstore(&mut self, block: u32, place: usize) {
         let Block { node, place: in_node, voxels, .. } = self.blocks.get_mut(block);
         voxels.remove(&mut self.lists, place);
@@ -207,7 +207,7 @@ impl Tree {
         self.counts.set_inflating(tally, inflating);
         let (begin, end) = (begin.count_ones(), end.count_ones());
         let node = self.nodes.get_mut(node);
-        // Fits: a node has 4096 voxels.
+        // The number fits in 16 bits, because a node has 4096 voxels.
         node.inflating = (u32::from(node.inflating) + begin - end) as u16;
         let page = self.pages.get_mut(node.page);
         page.inflating = page.inflating + begin - end;
@@ -251,8 +251,8 @@ impl Tree {
 
     /// Removes a block if it is empty, and its node and page if they are empty as well.
     ///
-    /// The tree must be published before new nodes or blocks are created: they do not know what readers saw at their
-    /// positions.
+    /// Publish the tree before creating new nodes or blocks: a new node has no record of the blocks of a removed node
+    /// that readers still see at its position.
     pub(super) fn drop_if_empty(&mut self, block: u32) {
         let Block { node, place, voxels, tally, .. } = self.blocks.get(block).clone();
         if voxels.mask != 0 || !tally.is_empty() {
@@ -285,7 +285,7 @@ impl Tree {
         self.nodes.get(node).blocks.ids(&self.lists)
     }
 
-    /// Returns the number of voxels with occupancy that are not inflated.
+    /// Returns the number of stored voxels that are not inflated.
     pub(super) fn stored_but_not_inflated(&self) -> usize {
         let nodes = self.page_ids().flat_map(|page| self.nodes_of(page));
         let blocks = nodes.flat_map(|&node| self.blocks_of(node)).map(|&block| self.blocks.get(block));

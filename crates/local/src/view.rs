@@ -95,7 +95,7 @@ impl BlockView {
     }
 }
 
-/// Returns the value at a position among those of a mask.
+/// Returns the value of a position. `values` has one value for each position of the mask.
 fn at<T>(values: &[T], mask: u64, place: usize) -> Option<&T> {
     let rank = (mask & ((1 << place) - 1)).count_ones() as usize;
     (mask >> place & 1 != 0).then(|| &values[rank])
@@ -211,7 +211,7 @@ impl LocalView {
         }
     }
 
-    /// Returns the number of the update; 0 before the first.
+    /// Returns the number of the update that this view shows; 0 before the first.
     pub fn update_number(&self) -> u64 {
         self.update_number
     }
@@ -226,7 +226,7 @@ impl LocalView {
         self.grid.resolution_m()
     }
 
-    /// Returns the number of voxels with occupancy: occupied, or not yet known to be free.
+    /// Returns the number of stored voxels: occupied, or not yet known to be free.
     pub fn stored_voxels(&self) -> usize {
         self.stored
     }

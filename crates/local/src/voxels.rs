@@ -1,7 +1,7 @@
 use super::slab::Slab;
 use super::tree::NONE;
 
-/// A voxel with occupancy, linked into the history.
+/// A stored voxel, linked into the history: it is occupied or not yet known to be free.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Voxel {
     /// Clamped sum of the evidence so far.
@@ -15,7 +15,8 @@ pub(super) struct Voxel {
     place_and_touch: u32,
 }
 
-/// Maximum number of voxels with occupancy, including all points of a scan; each may have evidence in a scan.
+/// Maximum number of stored voxels, including a new one for each point of a scan. All of them may get evidence in one
+/// scan.
 pub(super) const MAX_NUMBERED: usize = NO_TOUCH as usize;
 
 /// Marks missing evidence, in 26 bits.
@@ -53,8 +54,8 @@ impl Voxel {
     }
 }
 
-/// All voxels with occupancy in the order of their last updates (the paper's history buffer): a doubly linked list, so
-/// that moving a voxel to the end takes constant time.
+/// All stored voxels in the order of their last updates (the history buffer of the paper by La, Kang and Lee): a doubly
+/// linked list, so that moving a voxel to the end takes constant time.
 #[derive(Clone, Debug)]
 pub(super) struct Voxels {
     pub(super) slab: Slab<Voxel>,

@@ -14,9 +14,9 @@ pub struct Answer {
     pub probability: Option<f64>,
     /// Log-odds of being occupied; `None` if unknown.
     pub log_odds: Option<f64>,
-    /// Number of updates of the voxel.
+    /// Number of updates of the voxel; `None` if unknown.
     pub observation_count: Option<i32>,
-    /// Center of the voxel.
+    /// Center of the voxel; `None` if unknown.
     pub voxel_center_m: Option<Point>,
 }
 

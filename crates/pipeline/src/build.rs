@@ -23,7 +23,7 @@ use voxtile_formats::{PointBudget, ReadOptions, ScanFingerprint};
 /// Divisor of the memory limit that gives the share for reading, without the points of scans: chunks and messages of
 /// recordings, poses, sorting of LAS files.
 const PARTS_FOR_READING: usize = 32;
-/// Minimum memory for reading. What exceeds the share is taken from the map's memory.
+/// Minimum memory for reading. If it exceeds the share, the difference is taken from the map's memory.
 const MIN_FOR_READING: usize = 4 << 20;
 
 /// Divisor of the memory limit that gives the share for the points of scans that are being read or inserted.
@@ -78,7 +78,7 @@ pub fn build(options: &BuildOptions, watch: &Watch) -> anyhow::Result<Option<Sum
             mapper
         }
         none => {
-            // If the first scan cannot be mapped, no empty map must be created.
+            // Check before the map is created: if the first scan cannot be mapped, no empty map may remain.
             ingest.check_first()?;
             let mut config = config;
             config.crs = crs;
@@ -177,7 +177,8 @@ impl Build<'_> {
                 Next::Scans(taken) => taken,
                 Next::Stopped => return Ok(()),
                 Next::End => {
-                    // The last scans may have been skipped.
+                    // The last scans may have been skipped after the last insertion, so record the state of the input
+                    // again.
                     self.note_content(self.ingest.content());
                     self.check_poses(PoseCheck::finish)?;
                     return Ok(());
@@ -256,7 +257,7 @@ fn read_options(options: &BuildOptions, config: &MapConfig) -> ReadOptions {
     read
 }
 
-/// Batches of points have no rays to replay.
+/// Checks that `no_rays` is not combined with kept scans, because points without rays cannot be replayed.
 fn check_no_rays(options: &BuildOptions, config: &MapConfig) -> voxtile::Result<()> {
     if !(options.no_rays && config.keeps_scans) {
         return Ok(());
@@ -266,7 +267,7 @@ fn check_no_rays(options: &BuildOptions, config: &MapConfig) -> voxtile::Result<
     Err(Error::argument("no_rays, keep_scans", reason))
 }
 
-/// Checks options that require other options.
+/// Checks options that require or exclude other options.
 fn check_combinations(options: &BuildOptions) -> voxtile::Result<()> {
     if options.again && (options.resume || !options.append) {
         return Err(Error::argument("again", "requires `append`, and excludes `resume`"));
@@ -301,7 +302,7 @@ fn flush_if(
         // The disk is slower than the schedule: the next flush begins after the current one.
         return Ok(());
     } else {
-        // Scans are inserted during the flush.
+        // Start the flush in the background; further scans are inserted meanwhile.
         mapper.begin_flush()?;
     }
     schedule.flushed();
@@ -346,8 +347,8 @@ fn begin(
     name: &str,
 ) -> anyhow::Result<Option<u64>> {
     let inputs = mapper.inputs();
-    // Inputs that begin with many empty scans cannot be distinguished by content, only by later scans or by their
-    // names.
+    // Inputs that begin with many empty scans may have the same content so far. Such inputs are distinguished by later
+    // scans or by their names.
     let is_this = |input: &InputRecord| {
         let is_known = |content: &InputContent| content.begins_with.is_some() || input.is_named(name);
         let is_same = |content: &InputContent| {
@@ -364,7 +365,7 @@ fn begin(
             }
             check_begun(options, &inputs[at], mapper)?;
             if at + 1 < inputs.len() {
-                // The map has other inputs after this one.
+                // The map has later inputs, so make this one the current input again.
                 mapper.begin_input(inputs[at].clone())?;
             }
             return Ok(Some(content.scans - content.skipped.len() as u64));
@@ -385,7 +386,7 @@ fn begin(
             return Ok(ingest.pass(done)?.then_some(done));
         }
     }
-    // A merged map has tiles but no scan count.
+    // A merged map is not empty, although its scan count is 0.
     let is_empty = mapper.scan_number() == 0 && mapper.tile_bounds().is_none();
     if options.resume && !options.append && !is_empty {
         let same = inputs.iter().rfind(|input| input.is_named(name) && input.content.is_some());

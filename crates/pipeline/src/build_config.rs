@@ -44,7 +44,7 @@ fn rays_begun(options: &BuildOptions, map: &MapReader) -> RayConfig {
     input.and_then(|input| input.rays).unwrap_or(map.config().rays)
 }
 
-/// Names the option that makes the tile size a multiple of the voxel size.
+/// Adds advice to the error that the tile size is not a multiple of the voxel size.
 fn name_the_option(error: Error) -> anyhow::Error {
     match error {
         Error::Grid(GridError::NotWhole { smaller_m, larger_m, .. }) => {

@@ -11,9 +11,9 @@ use voxtile_formats::{ScanChain, ScanFingerprint, StoredScan};
 
 /// Number of scans to search for the first one with points, which identifies the input.
 const LOOKAHEAD: usize = 16;
-/// Limit for the places of an input that cannot be read. All scans of a damaged chunk of a recording are at one place.
+/// Maximum number of unreadable places in an input. All scans of a damaged chunk of a recording count as one place.
 const MAX_BAD_PLACES: usize = 1000;
-/// Limit for the skipped scans of an input, because the map stores the number of each.
+/// Maximum number of skipped scans of an input. The map stores the number of each.
 const MAX_SKIPPED: usize = 10_000;
 
 /// Sequence of the scans of an input, and the record of the accepted ones for the map.
@@ -22,13 +22,14 @@ pub struct Ingest {
     scans: PathBuf,
     /// Scans that were read to identify the input and are not yet inserted.
     lookahead: VecDeque<Read>,
-    /// A read after the scans of a batch that is not a scan.
+    /// Result of a read that ended a batch of scans and is not a scan itself; returned by the next request.
     pending: Option<voxtile::Result<Read>>,
     chain: ScanChain,
     begins_with: Option<String>,
     skipped: Vec<u64>,
-    /// File offsets at which scans were skipped, and the number of skipped scans without such a place.
+    /// File offsets at which scans were skipped.
     bad_places: HashSet<(PathBuf, u64)>,
+    /// Number of skipped scans without a file offset.
     skipped_alone: usize,
     skips_bad: bool,
     /// Requirements for scans with rays. `None` for points without rays.
@@ -86,7 +87,7 @@ impl Ingest {
         self.reader.read_ahead(queue);
     }
 
-    /// Reads the scans that identify the input. Returns `false` if it was stopped before.
+    /// Reads the scans that identify the input. Returns `false` if reading was stopped.
     pub fn read_lookahead(&mut self) -> anyhow::Result<bool> {
         while self.lookahead.len() < LOOKAHEAD && self.begins_with.is_none() {
             match self.reader.next(&mut || Ok(()))? {
@@ -113,7 +114,7 @@ impl Ingest {
         })
     }
 
-    /// Checks the first scan, unless scans that cannot be mapped are skipped.
+    /// Returns an error if the first scan cannot be mapped and such scans are not skipped.
     pub fn check_first(&mut self) -> anyhow::Result<()> {
         if let (Some(needs), Some(scan)) = (&self.rays, self.first())
             && needs.sensor_model.needs_intensity()
@@ -131,7 +132,7 @@ impl Ingest {
         }
     }
 
-    /// Converts a scan that cannot be mapped to one that cannot be read.
+    /// Replaces a scan that cannot be mapped by its error, as for a scan that cannot be read.
     fn judged(&self, read: Read) -> Read {
         let Some(needs) = &self.rays else { return read };
         match read {
@@ -153,14 +154,14 @@ impl Ingest {
         let (Some(_), None) = (&self.begins_with, &content.begins_with) else {
             return content.begins_with == self.begins_with;
         };
-        // The map only has empty scans of its input. If it has none at all, nothing identifies the input.
+        // The recorded input begins with empty scans. If no scan was recorded, nothing identifies it.
         if content.scans == 0 {
             return false;
         }
         let (mut chain, mut reads) = (ScanChain::default(), self.lookahead.iter());
         while chain.scans() < content.scans {
             match reads.next() {
-                // Skipped by the earlier build, whether it can be read now or not.
+                // The earlier build skipped this scan, so skip it again, even if it is readable now.
                 Some(Read::Unread(_) | Read::Scan(_)) if content.skipped.contains(&chain.scans()) => {
                     chain.add_unread();
                 }
@@ -173,7 +174,7 @@ impl Ingest {
         chain.scan_text() == content.scan_chain
     }
 
-    /// Returns the fingerprint used in maps of older versions, or `None` if it was stopped before it was known.
+    /// Returns the fingerprint used in maps of older versions, or `None` if reading was stopped.
     pub fn fingerprint(&mut self) -> anyhow::Result<Option<voxtile::Result<String>>> {
         self.reader.fingerprint()
     }
@@ -199,7 +200,7 @@ impl Ingest {
         }
     }
 
-    /// Skips the scans that the map has, and checks that they are the same. Returns `false` if it was stopped before.
+    /// Skips the scans that the map has, and checks that they are the same. Returns `false` if reading was stopped.
     ///
     /// # Errors
     ///
@@ -351,7 +352,7 @@ impl Ingest {
         Some(read.map(|read| self.judged(read)))
     }
 
-    /// Returns a read that was made earlier and not yet used.
+    /// Returns a result of an earlier read that was not used yet.
     fn read_before(&mut self) -> Option<voxtile::Result<Read>> {
         self.pending.take().or_else(|| self.lookahead.pop_front().map(Ok))
     }

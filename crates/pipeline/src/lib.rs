@@ -4,7 +4,7 @@
 //! ```text
 //! BuildOptions -> build                                             build, build_config, flush_schedule
 //!   scans of a file, folder, map, bucket or pipe                    scan_input, kept_source, fetched_source
-//!   -> ScanReader, in its own thread -> ScanQueue -> Ingest         scan_reader, scan_queue, intake
+//!   -> ScanReader, in its own thread -> ScanQueue -> Ingest         scan_reader, scan_queue, ingest
 //!   -> a mapper -> Summary                                          summary
 //! ExportOptions -> export -> ExportSummary                          export/, output/
 //! numbers: lists of numbers used by all front ends                  numbers

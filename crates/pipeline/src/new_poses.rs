@@ -83,7 +83,7 @@ pub fn poses_for(from: &PoseFile<'_>, scans: &KeptSummary) -> Result<NewPoses> {
     by_time(&trajectory, file, scans, tolerance_ns, body_from_sensor.as_ref())
 }
 
-/// Returns whether poses match the scans one by one, as far as stamps show.
+/// Returns whether pose `k` can belong to scan `k` for all `k`: no stamps differ by more than the tolerance.
 fn is_in_step(trajectory: &Trajectory, scans: &[KeptScanHead], tolerance_ns: i64) -> Result<bool> {
     let most = u64::try_from(tolerance_ns).unwrap_or(0);
     for (of_pose, scan) in trajectory.stamps_ns().zip(scans) {

@@ -48,7 +48,8 @@ impl ScanQueue {
         Self { waiting: Mutex::default(), arrived, has_room, capacity, when_behind }
     }
 
-    /// Adds a read. If the input is to wait, blocks until there is space. Returns `false` if the queue is closed.
+    /// Adds the result of a read. If the input is to wait, blocks until there is space. Returns `false` if the queue is
+    /// closed.
     pub fn push(&self, read: voxtile::Result<Read>) -> bool {
         let mut waiting = self.lock();
         match read {
@@ -65,7 +66,7 @@ impl ScanQueue {
         !waiting.is_closed
     }
 
-    /// Returns the oldest read, waiting for at most `patience`, or `None` if none arrived.
+    /// Returns the oldest result of a read, or `None` if there is none within `patience`.
     pub fn take(&self, patience: Duration) -> Option<voxtile::Result<Read>> {
         let waiting = self.lock();
         let waited = self.arrived.wait_timeout_while(waiting, patience, |waiting| waiting.reads.is_empty());
@@ -107,7 +108,7 @@ impl Waiting {
     }
 }
 
-/// Returns whether this read is the last one.
+/// Returns whether no result of a read follows this one.
 pub fn is_last(read: &Result<Read, Error>) -> bool {
     matches!(read, Ok(Read::End | Read::Stopped) | Err(_))
 }
@@ -149,10 +150,10 @@ mod tests {
                     seen.push(fingerprint.scan_text());
                 }
                 Some(Ok(Read::End)) => break,
-                _ => panic!("nothing else was put in"),
+                _ => panic!("the queue contains only scans and the end"),
             }
         }
-        assert_eq!(seen, fingerprints, "every scan is known of, in order");
+        assert_eq!(seen, fingerprints, "the queue returns the fingerprints of all scans in order");
         assert!(queue.take(Duration::ZERO).is_none());
         (mapped, left_out)
     }

@@ -25,8 +25,8 @@ pub struct ScanReader {
     stop: Stop,
     /// Queue of scans that are read in advance.
     ahead: Option<Arc<ScanQueue>>,
-    /// Owned here and not by the thread, which is never joined, so that fetched files are removed before the process
-    /// ends.
+    /// Removes fetched files when dropped. The thread does not own them, because it is never joined and may still run
+    /// when the process ends.
     _scans: LocalScans,
 }
 
@@ -170,7 +170,7 @@ impl ScanReader {
         self.ahead.as_ref().and_then(|queue| queue.take(Duration::ZERO))
     }
 
-    /// Returns the fingerprint used in maps of older versions, or `None` if it was stopped before it was known.
+    /// Returns the fingerprint used in maps of older versions, or `None` if reading was stopped.
     pub fn fingerprint(&mut self) -> anyhow::Result<Option<voxtile::Result<String>>> {
         match self.request_answer(Request::Fingerprint, &mut || Ok(()))? {
             Some(Answer::Fingerprint(fingerprint)) => Ok(Some(fingerprint)),
@@ -178,8 +178,8 @@ impl ScanReader {
         }
     }
 
-    /// Stops reading and returns remarks for the user about the input. While the thread is waiting for the input, there
-    /// are none.
+    /// Stops reading and returns remarks for the user about the input. Returns no remarks if the thread is still
+    /// waiting for the input.
     pub fn remarks(&mut self) -> anyhow::Result<Vec<String>> {
         let is_ahead = self.ahead.as_ref().map(|queue| queue.close()).is_some();
         let mut patience = 10;

@@ -79,7 +79,7 @@ pub struct Args {
     /// Maximum occupancy probability of a voxel, for a new map [default: 0.971]
     #[arg(long, value_name = "P")]
     pub clamp_max: Option<f64>,
-    /// Which misses of a scan change a voxel, for a new map [default: octomap]
+    /// Rule that selects which misses of a scan clear known voxels, for a new map [default: octomap]
     #[arg(long, value_name = "RULE")]
     pub clearing: Option<ClearingRule>,
     /// Keep the scans in a new map, so that it can follow corrected trajectories
@@ -157,7 +157,7 @@ pub struct Args {
     pub network: bool,
 }
 
-/// Upper bound on differences of stamps, in seconds: almost 300 years.
+/// Upper bound on durations, in seconds: almost 300 years, which fits nanoseconds in an `i64`.
 const MAX_S: f64 = 9e9;
 /// Upper bound on lengths, larger than any map.
 const MAX_M: f64 = 1e9;
@@ -226,7 +226,7 @@ impl Args {
         self.memory_bytes() - self.queue_bytes() - self.remapping_bytes()
     }
 
-    /// Memory for the thread that remaps by corrected paths, in bytes.
+    /// Returns the memory for the thread that remaps by corrected paths, in bytes.
     pub fn remapping_bytes(&self) -> usize {
         if self.path.is_some() { self.memory_bytes() / 4 } else { 0 }
     }

@@ -1,12 +1,12 @@
 use voxtile::Clearing;
 
-/// Which misses of a scan change a voxel.
+/// Rule that selects which misses of a scan clear known voxels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum, serde::Deserialize, serde::Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum ClearingRule {
-    /// All, as in OctoMap.
+    /// All misses, as in OctoMap.
     Octomap,
-    /// All but those near surfaces, which only make unknown voxels free.
+    /// Misses away from surfaces. Misses near surfaces only make unknown voxels free.
     Guarded,
 }
 

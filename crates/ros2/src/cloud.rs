@@ -1,7 +1,7 @@
 use std::time::Instant;
 use voxtile_formats::RigidPose;
 
-/// A `sensor_msgs/PointCloud2` that waits for its pose. Its points are still in CDR.
+/// A `sensor_msgs/PointCloud2` that waits for its pose. Its points are still encoded as CDR.
 #[derive(Clone, Debug)]
 pub struct Cloud {
     /// Index of its topic.

@@ -16,7 +16,7 @@ impl CloudPoints {
         usize::try_from(message.points_claimed()).unwrap_or(usize::MAX).saturating_mul(BYTES_OF_POINT)
     }
 
-    /// Decodes a message that contains all points that it claims.
+    /// Decodes a message that is known to contain as many points as it claims.
     pub fn of(message: &PointCloud2<'_>) -> Self {
         let count = message.points_claimed() as usize;
         let mut positions_m = Vec::with_capacity(count);

@@ -4,8 +4,8 @@ use crate::when_behind::WhenBehind;
 use std::collections::VecDeque;
 use voxtile_formats::RigidPose;
 
-/// Queue of clouds, oldest first, with bounded memory. The memory of decoded points is reserved from the start. The
-/// reservation of a taken cloud ends when the next one is taken, so decoded points always fit.
+/// Queue of clouds, oldest first, with bounded memory. Each cloud reserves the memory of its decoded points when it is
+/// queued. A taken cloud keeps its reservation until the next one is taken, so decoded points always fit.
 #[derive(Debug)]
 pub struct CloudQueue {
     clouds: VecDeque<Cloud>,
@@ -75,7 +75,8 @@ impl CloudQueue {
         self.clouds.push_back(cloud);
     }
 
-    /// Stores the poses that are known now in the clouds, before their transforms are discarded.
+    /// Looks up the poses of queued clouds and stores them in the clouds, because the caller discards old transforms
+    /// next.
     pub fn settle(&mut self, pose_of: impl Fn(&Cloud) -> Option<RigidPose>) {
         for cloud in self.clouds.iter_mut().filter(|cloud| cloud.pose.is_none()).take(MAX_SETTLED) {
             cloud.pose = pose_of(cloud);
@@ -179,7 +180,7 @@ mod tests {
         queue.push(cloud(0, 1), &mut counters);
         assert!(queue.must_wait(&cloud(0, 2)));
         assert!(!CloudQueue::new(1500, 1, WhenBehind::DropOldest).must_wait(&cloud(0, 2)));
-        // The cloud is being mapped; then it is released.
+        // The taken cloud uses memory until it is released.
         assert_eq!(queue.take_ready(&mut counters, |_| Verdict::Ready(())).unwrap().0.stamp_ns, 1);
         assert!(queue.must_wait(&cloud(0, 2)));
         queue.release_taken();
@@ -199,7 +200,8 @@ mod tests {
         assert_eq!((queue.len(), counters.dropped_behind), (1, 1));
         let taken = queue.take_ready(&mut counters, |_| Verdict::Ready(()));
         assert_eq!((taken.unwrap().0.stamp_ns, queue.len()), (4, 0));
-        // The second cloud fits neither next to the first and the taken one, nor next to the taken one alone.
+        // Cloud 6 does not fit in addition to the taken cloud 4: first cloud 5 is dropped, as the oldest, and then
+        // cloud 6.
         queue.push(cloud(0, 5), &mut counters);
         queue.push(with_points(6), &mut counters);
         assert_eq!((queue.len(), queue.bytes, counters.dropped_behind), (0, 2000, 3));

@@ -3,8 +3,8 @@ use voxtile::mapper::KeptScanHead;
 use voxtile_formats::RigidPose;
 use voxtile_formats::ros::messages::StampedPose;
 
-/// New poses of a map's scans by a corrected path: of the scans that the path names by their stamps, and of the scans
-/// between them.
+/// New poses of a map's scans, computed from a corrected path. The path names scans by their stamps; scans between them
+/// are moved with them.
 #[derive(Clone, Debug, Default)]
 pub struct Corrections {
     /// Number and new pose of each scan.
@@ -20,7 +20,7 @@ pub struct Corrections {
 /// Maximum difference between the stamps of a scan and its path pose, because paths are often stored with rounded
 /// seconds.
 const SAME_STAMP_NS: u64 = 1_000_000;
-/// Stamps that decrease by more than this begin a new run.
+/// If stamps decrease by more than this, the scans that follow belong to another run of the robot.
 const ANOTHER_RUN_NS: i64 = 2_000_000_000;
 
 struct Scan {
@@ -149,7 +149,7 @@ mod tests {
             (found.most_moved_m - 5.0).abs() < 1e-12 && (found.most_turned.to_degrees() - 90.0).abs() < 1e-9
         );
 
-        // The third scan now follows the fourth, six metres behind it along its heading.
+        // The third scan keeps its pose relative to the fourth, which is turned: it is six metres behind the fourth.
         let found = Corrections::of(&records[2..4], &path).unwrap();
         let position = found.poses[0].1.position_m();
         assert!((0..3).all(|k| (position[k] - [10.0, -1.0, 0.0][k]).abs() < 1e-12), "{position:?}");

@@ -31,7 +31,7 @@ enum Rank {
     Mounted,
 }
 
-/// Inverse of the fraction of a publisher's frames that is dropped at a time.
+/// A publisher loses one in `PART` of its frames at a time.
 const PART: usize = 4;
 /// Minimum number of frames dropped at a time, because the selection is slow. Several publishers may be affected.
 const MIN_FORGOTTEN: usize = 100;
@@ -57,9 +57,8 @@ impl FrameOwners {
         }
     }
 
-    /// Removes and returns some frames that are not needed. Takes them from the publishers with most frames: moving
-    /// frames first, then static ones, and last static ones mounted on needed frames other than the fixed one. Among
-    /// equals, the least recently named are removed first.
+    /// Removes some frames that are not needed, and returns them. Starts with the publishers with most frames. Removes
+    /// the frames of a publisher in the order of `Rank`, and those of equal rank by age, the least recently sent first.
     pub fn forget_some(&mut self, needed: &HashSet<String>, fixed: &str) -> Vec<String> {
         let mounted = self.mounted(needed, fixed);
         let mut publishers: HashMap<Option<Gid>, Vec<(Rank, u64, &str)>> = HashMap::new();

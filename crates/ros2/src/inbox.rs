@@ -108,7 +108,7 @@ impl Inbox {
     /// Returns the next cloud with its pose, or `None` after `max_wait`.
     pub fn take(&self, max_wait: Duration) -> Option<(Cloud, RigidPose)> {
         let mut state = self.lock();
-        // The previous cloud is mapped: release its memory and wake readers that wait for it.
+        // The previous cloud is mapped: release its memory and wake the threads that wait for memory.
         state.queue.release_taken();
         self.changed.notify_all();
         for is_last in [false, true] {
@@ -137,7 +137,7 @@ impl Inbox {
         (state.counters, state.queue.len())
     }
 
-    /// Returns the reason why clouds get no pose, if that persists.
+    /// Returns the reason why clouds get no pose, if the problem persists.
     pub fn pose_problem(&self) -> Option<String> {
         self.lock().transforms.problem()
     }
@@ -152,7 +152,7 @@ impl Inbox {
         self.put_poses(MessageKind::Tf, &Message { cdr, publisher: None }, true);
     }
 
-    /// Wakes readers that wait for memory.
+    /// Closes the inbox and wakes the threads that wait for memory.
     pub fn close(&self) {
         self.lock().is_closed = true;
         self.changed.notify_all();

@@ -56,8 +56,8 @@ impl LiveMap {
         *moment = Moment { version, sensor_m, stamp_ns };
     }
 
-    /// Records that the map was changed as a whole and reopened. `sensor_m` is the corrected sensor position, if it
-    /// changed.
+    /// Records that a remap or a service changed the map on disk, and that it was reopened. `sensor_m` is the corrected
+    /// sensor position, if it changed.
     pub fn note_opening(&self, reader: LiveReader, sensor_m: Option<Point>) {
         let scan_number = reader.view().scan_number();
         let mut state = self.lock();

@@ -39,7 +39,7 @@ impl LocalMapping {
         self.map = Some(map);
     }
 
-    /// Drops the local map after the map changed as a whole. The next refresh creates it again.
+    /// Drops the local map, because a remap or a service changed the map. The next refresh creates it again.
     pub fn reset(&mut self) {
         self.live.local().set(None);
         self.map = None;

@@ -34,7 +34,8 @@ pub struct Mapping {
     orders: Receiver<PlacedOrder>,
     /// Save requests, each with the scan that must become durable.
     saves: Vec<(u64, PlacedOrder)>,
-    /// Corrected path, with the last scan before its arrival. That scan must be durable before remapping begins.
+    /// Corrected path, with the number of the last scan before its arrival. That scan must be durable before remapping
+    /// begins.
     path: Option<(u64, Vec<StampedPose>)>,
     remapping: Option<Remapping>,
     remapping_bytes: usize,
@@ -50,7 +51,8 @@ pub struct Mapping {
     warned_at: Option<Instant>,
     logged_at: Instant,
     sampled_at: Instant,
-    /// Time when the map on disk was last complete or last advanced, and its last scan then.
+    /// Time when the map on disk was last complete or last updated by a flush, and the number of its last scan at that
+    /// time.
     durable: (Instant, u64),
 }
 
@@ -353,7 +355,7 @@ impl Mapping {
         Ok(changed)
     }
 
-    /// Flushes and closes the map, changes it as a whole and reopens it. Clouds wait meanwhile.
+    /// Flushes and closes the map, calls `change` with its folder, and reopens it. Clouds wait meanwhile.
     fn change<T>(
         mut self,
         change: impl FnOnce(&Path) -> voxtile::Result<T>,

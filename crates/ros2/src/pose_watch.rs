@@ -30,7 +30,8 @@ impl PoseWatch {
         }
     }
 
-    /// Records a cloud without a pose. Returns a warning if one is due; if the cause may pass, only after a delay.
+    /// Records a cloud without a pose. Returns a warning if one is due. If the cause may be temporary, the first
+    /// warning is delayed.
     pub fn note_missed(
         &mut self,
         topic: usize,

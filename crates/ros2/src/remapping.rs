@@ -34,7 +34,7 @@ pub struct Remapped {
 /// Parameters of a remapping.
 #[derive(Clone, Copy, Debug)]
 pub struct Order {
-    /// Later scans were mapped after the path was sent, and keep their poses.
+    /// Last scan that the path corrects. Later scans were mapped after the path was sent, and keep their poses.
     pub last_scan: u64,
     pub tolerance_m: f64,
     pub memory_bytes: usize,
@@ -44,7 +44,7 @@ pub struct Order {
 const TOLERANCE: f64 = PI / 360.0;
 
 impl Remapping {
-    /// Starts with the scans up to one that is durable.
+    /// Starts the thread, which remaps the scans up to `last_scan` of the order. That scan must be durable.
     ///
     /// # Errors
     ///
@@ -90,7 +90,8 @@ impl Remapping {
 impl Drop for Remapping {
     /// Stops the remapping. The map is unchanged.
     fn drop(&mut self) {
-        // `end` took the thread. The stop flag must remain unset, because the remapping is still to be finished.
+        // After `end` there is no thread, and the stop flag must remain unset, because the remapping is still to be
+        // finished.
         let Some(thread) = self.thread.take() else { return };
         self.stop.set();
         let _ = self.flushes.send(());

@@ -14,7 +14,7 @@ pub struct StampCheck {
 struct Child {
     newest_ns: Option<i64>,
     taken: Option<Instant>,
-    /// Time since when all stamps are far in the future or far older.
+    /// Time since which all stamps of the frame were too far ahead or behind; `None` if the last one was accepted.
     off_since: Option<Instant>,
 }
 
@@ -31,13 +31,14 @@ pub enum StampVerdict {
     },
 }
 
-/// A stamp this far ahead of all others is invalid, unless all stamps of its frame are.
+/// A stamp further ahead of the newest stamp of all frames is refused. If all stamps of a frame are, its clock has
+/// jumped.
 const MAX_AHEAD_NS: i64 = 10_000_000_000;
-/// A stamp this far behind the newest of its frame is invalid, unless all stamps of its frame are.
+/// A stamp further behind the newest stamp of its frame is refused. If all stamps of a frame are, its clock has jumped.
 const MAX_BEHIND_NS: i64 = 2_000_000_000;
 /// Limit on memory under a flood of frames.
 const MAX_CHILDREN: usize = 4000;
-/// Time for which all stamps must be off before the clock counts as changed.
+/// Time for which all stamps of a frame must be too far ahead or behind before its clock counts as changed.
 const CONFIRM_AFTER: Duration = Duration::from_millis(500);
 
 impl StampCheck {

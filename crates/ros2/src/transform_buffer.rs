@@ -21,7 +21,7 @@ pub struct TransformBuffer {
     stamps: StampCheck,
     fixed_frame: String,
     max_wait: Duration,
-    /// Number of samples since the last removal of old ones, and number left after it.
+    /// Number of samples inserted since old ones were last removed, and number of samples left by that removal.
     samples: (usize, usize),
     owners: FrameOwners,
     /// Frames of clouds, each with the stamp of the last cloud that had a pose.
@@ -103,7 +103,7 @@ impl TransformBuffer {
         self.samples.0 += 1;
     }
 
-    /// Removes old samples, and of the largest frames enough to free memory for others.
+    /// Removes old samples. If too many are left, also removes samples of the frames with most samples.
     fn remove_old(&mut self, queue: &mut CloudQueue, counters: &mut Counters) {
         queue.settle(|cloud| self.find(cloud).ok());
         let mut left = self.transforms.forget_older_than(SPAN_NS);
@@ -240,7 +240,7 @@ fn remedy(why: &WhyNot) -> &'static str {
     }
 }
 
-/// tf 1 has names with leading slashes, tf 2 does not.
+/// Removes leading slashes from a frame name: tf 1 has them, tf 2 does not.
 fn bare(frame: &str) -> &str {
     frame.trim_start_matches('/')
 }

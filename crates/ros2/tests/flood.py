@@ -1,7 +1,8 @@
-"""Sends a node more clouds than its queue holds without transforms, then the transforms for the remaining ones.
+"""Sends a node clouds without transforms, more than its queue holds, and then the transforms of those in the queue.
 
-flood.py DOMAIN CLOUDS PID   prints the growth of the node's peak memory; the clouds received, dropped, waiting and
-                               mapped; and of the waiting ones those mapped and without a pose
+flood.py DOMAIN CLOUDS PID   prints the growth of the node's peak memory; the numbers of clouds received, dropped,
+                               waiting and mapped before the transforms; and how many of the waiting ones were mapped,
+                               or had no pose, after the transforms
 """
 
 import sys

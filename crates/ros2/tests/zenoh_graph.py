@@ -115,7 +115,8 @@ class Graph:
         def call(cdr):
             attachment, replies = self.attachment(), []
             until = time.time() + ANSWER_S
-            # Tokens arrive before the route to the service is known. Until then Zenoh returns no replies at once.
+            # Tokens arrive before the route to the service is known. Until then, Zenoh returns immediately, without a
+            # reply.
             while not replies and time.time() < until:
                 replies = list(self.session.get(key, payload=cdr, attachment=attachment, timeout=ANSWER_S))
             if len(replies) != 1 or replies[0].ok is None:

@@ -65,7 +65,7 @@ impl ScratchFile {
         self.check(at, count)?;
         let end = at + count as u64;
         if at < self.read_at || end > self.read_at + self.read.len() as u64 {
-            // At most the requested bytes, or a few KiB.
+            // A short request reads ahead, so that a record is read together with its header.
             let there = usize::try_from(self.len - at).unwrap_or(usize::MAX);
             self.read.resize(count.max(READ_BYTES).min(there), 0);
             self.is_at_end = false;

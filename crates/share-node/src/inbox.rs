@@ -32,8 +32,8 @@ struct State {
 struct Queue {
     messages: VecDeque<Message>,
     bytes: usize,
-    /// Processing time of its messages. An empty queue that gets a message is raised to the queue served last, so that
-    /// idle robots accumulate no credit.
+    /// Time spent on processing its messages. If an empty queue gets a message, its time is raised to that of the queue
+    /// served last, so that idle robots accumulate no credit.
     spent: Duration,
 }
 
@@ -97,7 +97,7 @@ impl Inbox {
     }
 
     fn lock(&self) -> MutexGuard<'_, State> {
-        // No code under this lock can panic with the state half changed.
+        // A poisoned lock is ignored: no code that holds it can panic after changing only a part of the state.
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }

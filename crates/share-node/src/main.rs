@@ -49,7 +49,7 @@ fn run(args: &Args) -> anyhow::Result<()> {
 }
 
 fn print_man_page() -> anyhow::Result<()> {
-    // The page is found by `man voxtile-share`, like the pages of the other commands.
+    // This name makes the page available as `man voxtile-share`, like the pages of the other commands.
     let command = Args::command().name("voxtile-share");
     Ok(clap_mangen::Man::new(command).render(&mut std::io::stdout().lock())?)
 }

@@ -14,7 +14,8 @@ use voxtile_share::{MapWatch, Receiver, ReceiverConfig, Sender};
 const STEP: Duration = Duration::from_millis(50);
 /// Time limit of a run after the last scan.
 const TIMEOUT: Duration = Duration::from_secs(600);
-/// Run time after the last scan without catch-up. The first scan is sent after twice this time.
+/// Simulated time after the last scan at which a run without catch-up requests ends. The first scan is sent at twice
+/// this time.
 const REST: Duration = Duration::from_secs(5);
 /// Maximum delay of a packet.
 const DELAY: Duration = Duration::from_millis(40);

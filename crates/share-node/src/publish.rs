@@ -91,7 +91,7 @@ impl Feed {
     fn open(args: &Args, source: &Path) -> anyhow::Result<Self> {
         match MapReader::open(source, 64 << 20) {
             Ok(map) => return Ok(Self::Map(Box::new(map))),
-            // Not a map: open it as scans.
+            // The path is not that of a map: open it as scans.
             Err(voxtile::Error::NoMap { .. } | voxtile::Error::Io { .. }) => {}
             Err(error) => return Err(error.into()),
         }

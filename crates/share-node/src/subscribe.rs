@@ -21,7 +21,7 @@ const STEP: Duration = Duration::from_millis(50);
 const SAVE: Duration = Duration::from_secs(30);
 /// Time for which layers must remain equal for `--until-equal`.
 const EQUAL: Duration = Duration::from_secs(3);
-/// Maximum number of robots that have not sent a status yet. The next one replaces the one that waits longest.
+/// Maximum number of robots that have not sent a status yet. A further robot replaces the one that has waited longest.
 const MAX_UNKNOWN: usize = 256;
 
 /// Accepted robot. Its receiver is in [`Subscriber::receivers`].
@@ -244,7 +244,7 @@ impl Subscriber<'_> {
         let Self { args, mut robots, receivers, mut reports, link, .. } = self;
         link.close();
         let grid = self.grid.or_else(|| grid_of_most(&receivers));
-        // Drop saved layers to free memory for the map.
+        // Drop layers that are saved in files, to free memory for the map.
         let mut left = Vec::new();
         for (name, receiver) in receivers {
             let Some(robot) = robots.remove(&name) else { continue };
@@ -311,7 +311,7 @@ fn grid_of_most(receivers: &Receivers<RobotName>) -> Option<Grid> {
     let grids: Vec<Grid> =
         receivers.iter().filter_map(|(_, receiver)| receiver.layer().map(|layer| *layer.grid())).collect();
     let count = |grid: &Grid| grids.iter().filter(|other| *other == grid).count();
-    // `max_by_key` returns the last of equal items, so iterate backwards.
+    // Of equally frequent grids, `max_by_key` returns the last one. Iterate backwards to get the first one.
     grids.iter().rev().max_by_key(|grid| count(grid)).copied()
 }
 

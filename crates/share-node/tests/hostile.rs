@@ -132,7 +132,7 @@ fn a_subscriber_keeps_to_its_memory_and_serves_others_under_hostile_packets() {
         assert!(begin.elapsed() < Duration::from_secs(400), "the memory is never full: {full:?}");
         std::thread::sleep(Duration::from_millis(5));
     }
-    // The subscriber requests the packets of the honest robot that the flood displaced.
+    // In this time, the subscriber requests the packets of the honest robot that the flood displaced.
     std::thread::sleep(Duration::from_secs(6));
     let peak = peak_rss_bytes(subscriber.id());
     stop(&subscriber);
@@ -217,7 +217,7 @@ fn a_fault_of_one_robot_does_not_affect_others() {
     for robot in ["honest", "damaged", "far-away", "other-size"] {
         assert!(layers.join(format!("{robot}.layer")).is_file(), "{robot}");
     }
-    // The map contains all layers except the one of another voxel size.
+    // The map contains all layers except the layer with another voxel size.
     let map_voxels = voxtile::MapReader::open(&map, 16 << 20).unwrap();
     let folded = voxtile::MapQueries::all_occupied_voxels(&map_voxels, None).unwrap();
     assert!(folded.len() as u64 > voxels);

@@ -16,7 +16,8 @@ fn two_processes_share_a_set_and_fold_the_layer_into_a_map() {
     let mut publisher = publisher("spotter", &scans(folder.path(), 1, 40), &endpoint);
     let (voxels, digest) = set_of(&mut publisher);
     assert!(voxels > 1000);
-    // The first one may have stopped early, when the sets were equal for three seconds: start another at the end.
+    // The first subscriber may have stopped before the last scan, if the sets were equal for three seconds. A second
+    // one runs after the last scan.
     drop(subscriber);
     let again = self::subscriber(&map, &[&endpoint], &["--until-equal", "--for", "120"]);
     assert_eq!(layers_of(&mut { again }), [("spotter".to_string(), voxels, digest, true)]);

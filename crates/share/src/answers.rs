@@ -9,7 +9,8 @@ use voxtile::space::{TileIndex, VoxelIndex};
 const MAX_SINGLE_TILES: usize = 1024;
 /// Number of digests for a range with more than [`MAX_SINGLE_TILES`] tiles.
 const GROUPS: usize = 64;
-/// Number of digested tiles that costs as much as one byte of an answer: a short answer may cover many tiles.
+/// The rate limit counts this many tiles of a digest as one byte, because a short answer may need the digests of many
+/// tiles.
 const TILES_PER_BYTE: usize = 4;
 
 impl Sender {
@@ -74,7 +75,7 @@ impl Sender {
         if entries.is_empty() {
             entries.push(self.entry(first, last));
         }
-        // An entry takes 13 to 32 bytes.
+        // An entry takes 13 to 32 bytes, and the other parts of a packet at most 64.
         let per_packet = (self.config.max_packet_bytes - 64) / 32;
         let header = self.header();
         let mut packets = Vec::new();
@@ -100,7 +101,7 @@ impl Sender {
                 if packets.len() >= self.config.packets_per_answer {
                     return packets;
                 }
-                // One voxel more than fits into a packet, to detect whether more voxels follow.
+                // Read one voxel more than fits into a packet, to detect whether more voxels follow.
                 let limit = super::codec::MAX_VOXELS_PER_PACKET + 1;
                 let voxels: Vec<VoxelIndex> = self.sent.in_range(range).take(limit).collect();
                 let grid = *self.grid();

@@ -119,7 +119,7 @@ impl AntiEntropy {
                 return None;
             }
         }
-        // Request no digests while the ranges that differ might not fit into `content`.
+        // Digests add ranges to `content`. Request none while `content` is half full, so that all ranges fit.
         let digests = if self.content.is_half_full() { None } else { self.digests.iter().next() };
         let (request, rest) = if let Some(range) = digests {
             (Request::Digests { epoch, range }, vec![range])
@@ -136,7 +136,7 @@ impl AntiEntropy {
     }
 }
 
-/// Largest number of voxels for which their content costs no more than further digests.
+/// A range of at most this many voxels is requested as voxels, because further digests would take as many bytes.
 const FEW_VOXELS: u64 = 256;
 
 fn is_single(layer: &VoxelSet, range: SetRange) -> bool {

@@ -30,7 +30,7 @@ impl IntervalSet {
     /// Adds a range; adjacent ranges are not merged.
     pub(super) fn put(&mut self, part: SetRange) {
         self.remove(part);
-        // Part of the range may remain, if the limit prevented a split.
+        // If the limit prevented a split, the existing range still covers the new one.
         if self.overlapping(part).next().is_some() {
             return;
         }
@@ -43,7 +43,7 @@ impl IntervalSet {
         if self.ranges.len() < MAX_RANGES {
             self.ranges.insert(part.first, part.last);
         } else if let Some((_, last)) = self.ranges.pop_first() {
-            // The new range is before all others: extend the first one back to it.
+            // The new range is before all others: extend the first of them backwards, so that it contains the new one.
             self.ranges.insert(part.first, last);
         }
     }

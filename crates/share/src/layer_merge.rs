@@ -6,29 +6,29 @@ use voxtile::scan::PointBatch;
 use voxtile::space::Point;
 use voxtile::{Error, Result};
 
-/// Counts of a layer merged into an archive.
+/// Counts of a layer that was merged into a map.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
 #[non_exhaustive]
 pub struct LayerMergeReport {
     /// Voxels of the layer.
     pub voxels: u64,
-    /// Voxels that are already occupied in the archive and are left unchanged.
+    /// Voxels that are already occupied in the map and are left unchanged.
     pub known: u64,
     /// Voxels that received a hit.
     pub hits: u64,
 }
 
-/// Voxels per batch. A tile may hold a billion voxels.
+/// Maximum voxels per batch: a tile may hold a billion voxels.
 const VOXELS_AT_A_TIME: usize = 1 << 16;
 
-/// Merges a layer into an archive: each voxel of the layer that is not occupied in the archive gets one hit. The
-/// archive's own scans therefore weigh more, and merging the same layer again changes only the voxels that are still
-/// not occupied after one hit.
+/// Merges a layer into a map: each voxel of the layer that is not occupied in the map gets one hit. The map's own scans
+/// therefore weigh more, and merging the same layer again changes only the voxels that are still not occupied after one
+/// hit.
 ///
 /// # Errors
 ///
-/// An archive with another resolution or with a sensor model that needs intensities; a tile that cannot be read or
-/// written. After an error, the voxels merged so far remain in the archive.
+/// A map with another resolution or with a sensor model that needs intensities; a tile that cannot be read or written.
+/// After an error, the voxels merged so far remain in the map.
 pub fn merge_layer(layer: &VoxelSet, mapper: &mut impl Mapper) -> Result<LayerMergeReport> {
     if mapper.config().grid.resolution_m().to_bits() != layer.grid().resolution_m().to_bits() {
         let reason = format!(

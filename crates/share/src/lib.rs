@@ -1,7 +1,7 @@
 //! Sharing of maps between robots: one robot's occupied voxels reach the others exactly, even over a lossy link.
 //!
-//! A sender holds a set of voxels: the occupied voxels of its archive or local map. A receiver keeps a copy of the set
-//! per robot, called a layer. Packets may be lost, delayed, duplicated or reordered; the layer still converges to the
+//! A sender holds a set of voxels: the occupied voxels of its map or local map. A receiver keeps a copy of the set per
+//! robot, called a layer. Packets may be lost, delayed, duplicated or reordered; the layer still converges to the
 //! sender's set. The method follows La, Kang and Lee, "A robust, task-agnostic and fully-scalable voxel mapping system
 //! for large scale environments", section V-C, which sends only newly occupied voxels. `docs/sharing.md` specifies the
 //! protocol and the packet format.

@@ -20,7 +20,7 @@ impl<'a> LocalRays<'a> {
         Self { map, scan, grid, ranges_m2 }
     }
 
-    /// Returns the voxels of `wanted` that a ray passes. Other voxels left the map by age.
+    /// Returns the voxels of `wanted` that a ray passes. The others left the map because of the limit on voxels.
     pub(super) fn passed(&self, mut wanted: FxHashSet<VoxelIndex>) -> FxHashSet<VoxelIndex> {
         let mut found = FxHashSet::default();
         let Some(start) = self.grid.voxel_of(self.scan.origin) else { return found };

@@ -1,5 +1,5 @@
-/// Choice of the voxels in a frame: the three policies of the paper's figure 4. Anti-entropy repairs what a policy
-/// misses.
+/// Choice of the voxels in a frame: the three policies in figure 4 of the paper by La, Kang and Lee. Receivers detect
+/// the voxels that a policy misses, and request them.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum ExportPolicy {

@@ -115,7 +115,8 @@ mod tests {
         for seed in 0..50 {
             let mut random = Random::of(seed, &[]);
             let mut parts = RangeVersions::default();
-            // Positions between 9 and 10 of a tile need no entry: ranges begin and end at numbered positions.
+            // The test uses 20 numbered positions per tile. Ranges begin and end at these, so no other positions need
+            // to be compared.
             let mut plain = vec![None::<u64>; 40];
             for step in 0..60 {
                 let mut ends = [random.below(40), random.below(40)];
@@ -157,7 +158,7 @@ mod tests {
         for k in (0..10).rev().chain(12..19).chain(10..12).chain(20..30) {
             parts.record(SetRange { first: position(k), last: position(k) }, 7);
         }
-        // The positions between 9 and 10 and position 19 have no version.
+        // Three ranges: the codes between positions 9 and 10, and position 19, have no version.
         assert_eq!(parts.len(), 3);
         parts.record(SetRange::ALL, 7);
         parts.record(SetRange::ALL, 8);

@@ -15,7 +15,7 @@ pub struct ReceiverConfig {
     pub max_voxels: u64,
     /// Maximum number of tiles of the robot. Default: 2^17.
     pub max_tiles: usize,
-    /// Region outside of which voxels are refused; `None` for no region. Default: none.
+    /// Region outside of which voxels are refused; `None` accepts all voxels. Default: `None`.
     pub region: Option<VoxelBox>,
     /// Whether to send requests. Without requests, a receiver only listens. Default: true.
     pub sends_requests: bool,

@@ -21,7 +21,7 @@ impl Receiver {
         self.limits.bytes = bytes.saturating_sub(self.bytes_without_layer());
     }
 
-    /// Sets the maximum size of the versions from the receiver's guaranteed memory.
+    /// Sets the maximum size of the versions to a share of `bytes`, the memory that the receiver is guaranteed.
     pub(super) fn set_part_bytes(&mut self, bytes: usize) {
         self.version_bytes = bytes / VERSIONS_DIVISOR;
         if let Some(stream) = &mut self.stream {
@@ -36,7 +36,7 @@ impl Receiver {
         self.counts.cut_voxels += cut;
         if cut > 0 {
             self.is_over_limit = true;
-            // The layer may have been equal before.
+            // A layer without some of its voxels is no longer equal to the sender's set.
             self.equal_as_of = None;
         }
     }

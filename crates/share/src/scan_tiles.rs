@@ -42,7 +42,7 @@ impl<'a> Ends<'a> {
         if !length_m.is_finite() {
             return None;
         }
-        // The longer ray first, because an upper bound suffices here.
+        // Try the longer ray first, because the result may be longer than the actual ray.
         self.cuts_m.iter().find_map(|&cut_m| {
             let end = if length_m > cut_m { self.at(offset, cut_m / length_m) } else { point };
             self.grid.voxel_of(end).filter(|&last| self.steps_to(last) <= MAX_RAY_STEPS)

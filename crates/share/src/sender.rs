@@ -198,7 +198,8 @@ impl Sender {
         let mut voxels: Vec<VoxelIndex> = changed.into_keys().chain(resent.iter().copied()).collect();
         self.counts.updates_again += resent.len() as u64;
         match self.config.policy {
-            // A frame with only repairs gets no other voxels. Otherwise, each repair of a lost repair would be larger.
+            // A frame with only repairs gets no other voxels. Otherwise, each time that a repair is lost, the next
+            // repair would be larger.
             _ if !has_changes => {}
             ExportPolicy::LastFrame => {}
             ExportPolicy::Ring(frames) => voxels.extend(self.ring.last_frames(frames - 1)),

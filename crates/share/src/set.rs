@@ -118,7 +118,7 @@ impl VoxelSet {
             _ => of_tile.bricks.insert(brick, mask),
         };
         let (before, after) = (before.as_ref().map_or(0, count), count(&mask));
-        // Bricks are never empty.
+        // A brick exists if and only if it has voxels.
         self.bricks = self.bricks + usize::from(after > 0) - usize::from(before > 0);
         of_tile.len = of_tile.len + after - before;
         of_tile.digest = None;

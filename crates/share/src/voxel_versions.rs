@@ -30,7 +30,7 @@ const MIN_VOXELS: usize = 1 << 12;
 /// Maximum number of range versions.
 const MAX_RANGES: usize = 4096;
 
-/// Maximum number of bytes per voxel: table and queue have both just doubled.
+/// Maximum number of bytes per voxel, reached when table and queue have both just doubled.
 const BYTES_PER_VOXEL: usize =
     (size_of::<(VoxelIndex, u64)>() + 1) * 16 / 7 + 2 * size_of::<(u64, VoxelIndex)>();
 /// Upper bound on the memory of all range versions, in bytes: a B-tree node has space for 11 ranges and holds at least
@@ -65,7 +65,7 @@ impl VoxelVersions {
 
     /// Returns whether a later packet has changed a voxel.
     pub(super) fn is_later(&self, grid: &Grid, voxel: VoxelIndex, sequence: u64) -> bool {
-        // The content of a range includes the packet of its version.
+        // A replaced range already includes the changes of packet `sequence` if its version is `sequence` or later.
         self.was_changed_after(voxel, sequence) || self.parts.is_as_of(position_of(grid, voxel), sequence)
     }
 
@@ -86,7 +86,8 @@ impl VoxelVersions {
         self.newest = self.newest.max(sequence);
         for voxel in voxels {
             if self.recorded.len() == self.max_voxels {
-                // A packet that exceeds the limit is treated as forgotten.
+                // A packet with more voxels than the limit is treated as forgotten: it and earlier packets are refused
+                // from now on.
                 self.forget_all_but(0);
                 self.forget_up_to(sequence);
                 return;

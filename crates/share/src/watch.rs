@@ -10,7 +10,7 @@ use voxtile::space::{BrickMask, Grid, TileIndex, VoxelIndex};
 use voxtile::{Error, Result};
 use voxtile_local::{LocalMap, LocalReport, LocalState, LocalView};
 
-/// Passes an archive's occupied voxels to a sender: voxels with at least a threshold probability.
+/// Passes a map's occupied voxels to a sender: voxels with at least a threshold probability.
 #[derive(Clone, Copy, Debug)]
 pub struct MapWatch {
     threshold_log_odds: f64,
@@ -75,8 +75,8 @@ fn check_grid(grid: &Grid, sender: &Sender) -> Result<()> {
     Err(Error::argument("grid", reason))
 }
 
-/// Passes a local map's occupied voxels to a sender. A voxel that leaves the map by age remains in the set; a voxel
-/// that rays have cleared leaves the set.
+/// Passes a local map's occupied voxels to a sender. A voxel that leaves the map because of the limit on voxels remains
+/// in the set; a voxel that rays have cleared leaves the set.
 #[derive(Clone, Debug)]
 pub struct LocalWatch {
     seen: Option<Arc<LocalView>>,

@@ -1,9 +1,9 @@
 use super::{Random, Solid};
 
-/// Distance between the middle lines of two streets in metres: a block with half of the streets around it.
+/// Distance between the centre lines of two parallel streets in metres: a block and half a street on either side.
 pub(super) const BLOCK_M: f64 = 60.0;
 
-// Distances from the middle line of a street, in metres. Traffic stays within 4 m of it.
+// Distances from the centre line of a street, in metres. Traffic stays within 4 m of it.
 const CAR_MIDDLE_M: f64 = 5.75;
 const KERB_M: f64 = 7.0;
 const LAMP_M: f64 = 7.6;
@@ -13,7 +13,7 @@ const FRONT_M: f64 = 10.0;
 /// Maximum depth of a house, in metres from the building line.
 const DEEPEST_M: f64 = 15.0;
 
-/// Adds all boxes of the block at integer coordinates; none extends beyond the block.
+/// Adds all boxes of one block, given by its index along x and y. No box extends beyond the block.
 pub(super) fn build(seed: u64, block: [i64; 2], solids: &mut Vec<Solid>) {
     let mut random = Random::of(seed, &block);
     let corner_m = block.map(|i| i as f64 * BLOCK_M);
@@ -46,7 +46,7 @@ enum Side {
     East,
 }
 
-/// One side of a block, in coordinates `along` its street and `off` the street's middle line.
+/// One side of a block, in coordinates `along` its street and `off` the street's centre line.
 struct Edge {
     side: Side,
     corner_m: [f64; 2],
@@ -75,7 +75,8 @@ impl Edge {
     }
 }
 
-/// Adds a row of houses. South and north rows reach from corner to corner, the others fill the gaps.
+/// Adds a row of houses. South and north rows reach from corner to corner; west and east rows fill the gap between
+/// them.
 fn houses(random: &mut Random, edge: &mut Edge) {
     let between = matches!(edge.side, Side::West | Side::East);
     let inset_m = FRONT_M + if between { DEEPEST_M + 0.5 } else { 0.0 };

@@ -10,7 +10,7 @@ pub struct Building {
     seed: u64,
 }
 
-/// Room of a [`Building`]; its frame begins at its corner farthest from the corridor.
+/// Room of a [`Building`]. Its coordinates start at a corner of its outer wall.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Room {
     column: u32,
@@ -78,7 +78,8 @@ impl Room {
         self.door_m
     }
 
-    /// Converts room coordinates, along its width and from its outer wall to the corridor, to world x and y.
+    /// Converts room coordinates to world x and y: `along_m` along the room's width, `deep_m` from its outer wall to
+    /// the corridor.
     pub(super) fn in_world(&self, along_m: f64, deep_m: f64) -> [f64; 2] {
         let y = if self.is_south { deep_m } else { Building::SIZE_M[1] - deep_m };
         [f64::from(self.column) * Self::WIDTH_M + along_m, y]
@@ -101,7 +102,7 @@ impl Room {
         add([0.0, door[0]], front, [0.0, height], WALL);
         add([door[1], width], front, [0.0, height], WALL);
         add(door, front, [DOOR_HEIGHT_M, height], WALL);
-        // Pillar in the middle; a walk goes around it.
+        // Pillar in the middle of the room; `Walk` leads around it.
         let middle = [0.5 * width, 0.5 * depth];
         add([middle[0] - 0.22, middle[0] + 0.22], [middle[1] - 0.22, middle[1] + 0.22], [0.0, height], 0.6);
         // Furniture is at the walls.

@@ -4,8 +4,8 @@ use voxtile::space::Point;
 
 /// Unbounded synthetic city: streets on a square grid, houses, parks, parked cars, lamps, trees.
 ///
-/// Blocks are generated from the seed and their integer coordinates when a ray needs them, and are not stored, so a
-/// city needs no memory but its seed. The ground is the plane z = 0; the middle lines of the streets are at multiples
+/// Blocks are generated from the seed and their integer coordinates when a ray needs them. They are not stored, so a
+/// city takes no memory but its seed. The ground is the plane z = 0; the centre lines of the streets are at multiples
 /// of [`City::BLOCK_M`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct City {
@@ -16,7 +16,7 @@ pub struct City {
 const GROUND_REFLECTIVITY: f64 = 0.22;
 
 impl City {
-    /// Distance between the middle lines of two streets, in metres.
+    /// Distance between the centre lines of two parallel streets, in metres.
     pub const BLOCK_M: f64 = block::BLOCK_M;
 
     /// Returns the city of a seed.

@@ -11,21 +11,21 @@ use voxtile::scan::Pose;
 pub struct Drive {
     spacing_m: f64,
     next: u64,
-    /// Plan at the beginning.
+    /// Turns from the start of the drive, to restart from when an earlier pose is requested.
     plan: Plan,
-    /// Plan after the current leg.
+    /// Turns after the current leg.
     ahead: Plan,
     leg: Leg,
     /// Distance driven before the leg, in metres.
     start_m: f64,
 }
 
-/// The car parks after a million kilometres, so that finding any index takes bounded time.
+/// Distance at which the car stops, in metres, so that finding any index takes bounded time.
 const FARTHEST_M: f64 = 1e9;
 
 impl Drive {
-    /// Returns a random drive with turns and loops: a quarter of the decisions is a loop around a block, the rest are
-    /// random turns, so it revisits streets in both directions.
+    /// Returns a random drive. One in four manoeuvres is a loop around a block, the others are random turns, so the
+    /// drive visits streets again in both directions.
     ///
     /// There is a pose every `spacing_m` metres (1 m if that is not a positive length).
     pub fn new(seed: u64, spacing_m: f64) -> Self {
@@ -34,14 +34,15 @@ impl Drive {
 
     /// Returns a drive on mostly new streets.
     ///
-    /// It consists of stages, east and north in turn, each of 2 to 11 streets. One stage in four has a lap: around 2 to
-    /// 7 blocks to the side, back on streets of earlier stages, and its own streets again. A good fifth of the distance
-    /// is driven again after one or two kilometres; the rest is new for any length of the drive.
+    /// It consists of stages of 2 to 11 streets, which lead east and north in turn. After one stage in four the car
+    /// drives around a rectangle of blocks, 2 to 7 blocks wide, partly on streets of earlier stages, and then repeats
+    /// the stage. In a drive of any length about a fifth of the distance is on streets driven one or two kilometres
+    /// before; the rest is new.
     pub fn tour(seed: u64, spacing_m: f64) -> Self {
         Self::by(Plan::tour(seed), spacing_m)
     }
 
-    /// Returns endless laps of the same round: `edge_blocks` (at least 1) streets ahead, a left turn, and so on.
+    /// Returns endless laps around a square of `edge_blocks` (at least 1) blocks per side, with left turns.
     pub fn laps(edge_blocks: u64, spacing_m: f64) -> Self {
         Self::by(Plan::laps(edge_blocks), spacing_m)
     }
@@ -98,7 +99,7 @@ mod tests {
     }
 
     #[test]
-    fn poses_follow_each_other_at_the_spacing() {
+    fn poses_have_the_requested_spacing() {
         drives(4, 1.0).into_iter().for_each(check_spacing);
     }
 

@@ -26,7 +26,7 @@ pub(super) enum Turn {
 
 /// Height of the sensor above the ground, in metres.
 pub(super) const SENSOR_HEIGHT_M: f64 = 1.8;
-/// Distance of the lane from the street's middle line to the right, in metres.
+/// Distance of the lane to the right of the street's centre line, in metres.
 const LANE_M: f64 = 2.0;
 /// Half the edge length of a crossing, in metres; cars turn inside it.
 const CROSSING_M: f64 = 8.0;

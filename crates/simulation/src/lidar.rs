@@ -20,7 +20,7 @@ pub struct Lidar {
     pub max_range_m: f64,
     /// Standard deviation of the range noise in metres; 0 for exact ranges.
     pub range_noise_m: f64,
-    /// Whether a ray without a hit returns a point at the sensor, which maps skip and count.
+    /// Whether a ray without a hit returns a point at the sensor's position. Maps count such points and ignore them.
     pub reports_misses: bool,
 }
 
@@ -67,8 +67,8 @@ impl Lidar {
         Self { beams, rays_per_beam: (rays.saturating_add(beams / 2) / beams).max(1), ..Self::street() }
     }
 
-    /// Returns a lidar for a mast of [`Lidar::MAST_M`] with about `rays` rays per turn. It looks down on the city, up
-    /// to [`Scene::MAX_RADIUS_M`](super::Scene::MAX_RADIUS_M).
+    /// Returns a lidar with about `rays` rays per turn for a mast of height [`Lidar::MAST_M`]. It looks down on the
+    /// city, up to [`Scene::MAX_RADIUS_M`](super::Scene::MAX_RADIUS_M).
     pub fn mast(rays: u32) -> Self {
         Self { elevation_deg: [-40.0, -4.0], max_range_m: super::Scene::MAX_RADIUS_M, ..Self::of_rays(rays) }
     }
@@ -79,7 +79,7 @@ impl Lidar {
     /// Returns the scan from a pose: points in the world frame, intensities from 0 to 255.
     ///
     /// Points are ordered by angle, with all beams of one angle together. The noise depends on `seed` and
-    /// `scan_number`, so a second visit has other noise.
+    /// `scan_number`, so two scans from the same pose differ.
     pub fn scan(&self, world: &impl World, world_from_sensor: &Pose, seed: u64, scan_number: u64) -> Scan {
         let origin = world_from_sensor.position_m();
         let rotation = world_from_sensor.isometry().rotation.to_rotation_matrix();
@@ -96,7 +96,8 @@ impl Lidar {
                 let d = [flat * cos_azimuth, flat * sin_azimuth, up];
                 let direction =
                     std::array::from_fn(|i| r[(i, 0)] * d[0] + r[(i, 1)] * d[1] + r[(i, 2)] * d[2]);
-                // One number per ray, so that a ray's noise does not depend on the hits of others.
+                // Draw the noise also for rays without a hit, so that a ray's noise does not depend on the hits of
+                // other rays.
                 let error_m = self.range_noise_m * noise.bell();
                 match scene.cast(origin, direction, self.max_range_m) {
                     Some(hit) => {
@@ -182,17 +183,17 @@ mod tests {
     }
 
     #[test]
-    fn a_lidar_of_odd_numbers_scans_without_a_panic() {
-        for odd in [0.0, -1.0, f64::NAN, f64::INFINITY, 1e300] {
+    fn extreme_and_invalid_settings_cause_no_panic() {
+        for value in [0.0, -1.0, f64::NAN, f64::INFINITY, 1e300] {
             let lidar = Lidar {
                 beams: 1,
                 rays_per_beam: 3,
-                elevation_deg: [odd; 2],
-                max_range_m: odd,
-                range_noise_m: odd,
+                elevation_deg: [value; 2],
+                max_range_m: value,
+                range_noise_m: value,
                 ..Lidar::demo()
             };
-            lidar.scan(&City::new(1), &level_pose([odd, 0.0, 1.0], 0.0), 1, 0);
+            lidar.scan(&City::new(1), &level_pose([value, 0.0, 1.0], 0.0), 1, 0);
         }
         let nothing = Lidar { beams: 0, ..Lidar::demo() };
         assert!(nothing.scan(&City::new(1), &level_pose([0.0, 0.0, 1.0], 0.0), 1, 0).points.is_empty());

@@ -4,7 +4,7 @@ use super::leg::Turn;
 /// Sequence of turns of a drive, one per crossing.
 #[derive(Clone, Debug)]
 pub(super) enum Plan {
-    /// A quarter of the decisions is a loop around a block, the rest are random turns.
+    /// One in four manoeuvres is a loop around a block, the others are random turns.
     Wander { seed: u64, crossing: u64 },
     /// Mostly new streets, with occasional laps around some blocks.
     Tour(Tour),
@@ -12,10 +12,11 @@ pub(super) enum Plan {
     Laps { edge: u64, crossing: u64 },
 }
 
-/// Stages that lead east and north in turn, so that a stage meets earlier ones only in its own lap.
+/// Stages that lead east and north in turn, so that a stage meets streets of earlier stages only in its own lap.
 ///
-/// A stage is `ahead` streets straight on and a turn. One stage in four drives a lap first: from its far end once
-/// around `ahead` x `across` blocks on the side of the earlier stages, and then the `ahead` streets again.
+/// A stage leads straight on along `ahead` streets and ends with a turn. One stage in four has a lap: at the end of the
+/// `ahead` streets the drive goes once around `ahead` x `across` blocks on the side of the earlier stages, and then
+/// along the `ahead` streets again.
 #[derive(Clone, Debug)]
 pub(super) struct Tour {
     seed: u64,
@@ -33,7 +34,7 @@ struct Stage {
     turn: Turn,
 }
 
-/// Number of turns per decision of a wandering drive, so that a loop around a block is one decision.
+/// Number of turns of a manoeuvre of a wandering drive: four equal turns are a loop around a block.
 const TURNS_A_MANOEUVRE: u64 = 4;
 
 impl Plan {
@@ -65,7 +66,7 @@ impl Plan {
     }
 }
 
-/// Returns the turn of a wandering drive at a crossing by its number.
+/// Returns the turn of a wandering drive at a crossing, given its number in the drive.
 fn wandering(seed: u64, crossing: u64) -> Turn {
     let manoeuvre = crossing / TURNS_A_MANOEUVRE;
     let mut whole = Random::of(seed, &[1, manoeuvre as i64]);
@@ -114,7 +115,7 @@ impl Stage {
             return self.turn;
         }
         let Self { ahead, across, .. } = *self;
-        // Only stages with a lap have these corners.
+        // Crossings where the lap turns. A stage without a lap ends at the first of them, which is handled above.
         let corners = [ahead, ahead + across, 2 * ahead + across, 2 * (ahead + across)];
         match (corners.contains(&crossing), self.turn) {
             (false, _) => Turn::Ahead,

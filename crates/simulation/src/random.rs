@@ -8,8 +8,8 @@ pub struct Random {
 const STEP: u64 = 0x9E37_79B9_7F4A_7C15;
 
 impl Random {
-    /// Returns the generator for one object, identified by numbers; generators of other objects or seeds are
-    /// independent.
+    /// Returns the generator for one object, identified by a list of numbers. Generators of different objects or seeds
+    /// are independent.
     pub fn of(seed: u64, name: &[i64]) -> Self {
         let fold = |state: u64, part: &i64| mixed(state.wrapping_add(STEP) ^ mixed(*part as u64));
         Self { state: name.iter().fold(mixed(seed.wrapping_add(STEP)), fold) }

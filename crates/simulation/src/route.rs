@@ -2,7 +2,7 @@ use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
 use voxtile::maths;
 use voxtile::scan::Pose;
 
-/// Pose of a sensor, step by step.
+/// Trajectory of a sensor: a pose for each step.
 pub trait Route {
     /// Returns the pose of the sensor at a step: the transform from the sensor frame (x ahead, y left, z up, metres) to
     /// the world frame.

@@ -30,7 +30,8 @@ pub struct Hit {
 
 /// Edge length of a cell in metres: a street ray of 12 m crosses about four, each with a few boxes.
 const CELL_M: f64 = 4.0;
-/// Margin in metres by which boxes extend into cells, so that rounding cannot hide a box from a ray.
+/// Margin in metres by which a box is enlarged when it is sorted into cells, so that rounding cannot hide it from a
+/// ray.
 const MARGIN_M: f64 = 1e-6;
 
 impl Scene {
@@ -229,7 +230,7 @@ mod tests {
     }
 
     #[test]
-    fn a_scene_of_any_numbers_answers_without_a_panic() {
+    fn extreme_and_invalid_numbers_cause_no_panic() {
         let odd = [0.0, -1.0, 1e300, f64::NAN, f64::INFINITY, f64::MIN_POSITIVE];
         for a in odd {
             for b in odd {

@@ -15,7 +15,7 @@ pub struct Survey<W, R> {
 }
 
 impl<W: World, R: Route> Survey<W, R> {
-    /// Returns a survey with this seed of the sensor noise.
+    /// Returns a survey. `seed` is the seed of the sensor's range noise.
     pub fn new(world: W, route: R, lidar: Lidar, seed: u64) -> Self {
         Self { world, route, lidar, seed, next: 0 }
     }
@@ -81,7 +81,7 @@ impl Survey<Building, Walk> {
 
 /// Rounds through a warehouse, with about `rays` rays per scan.
 impl Survey<Warehouse, Walk> {
-    /// Returns a scan every ten centimetres of endless rounds: one metre and ten scans per second.
+    /// Returns a scan every ten centimetres of endless rounds, as of a sensor with ten scans per second at 1 m/s.
     pub fn warehouse(seed: u64, rays: u32) -> Self {
         Self::new(Warehouse::new(seed), Walk::in_warehouse(0.1), Lidar::of_rays(rays), seed)
     }
@@ -149,7 +149,7 @@ mod tests {
     }
 
     #[test]
-    fn a_scan_alone_is_the_scan_in_sequence() {
+    fn scan_at_equals_the_scan_of_the_iterator() {
         let sequence: Vec<Scan> = Survey::demo(5).take(150).collect();
         let mut survey = Survey::demo(5);
         for index in [149, 0, 77, 76] {

@@ -2,10 +2,10 @@ use super::leg::{Leg, SENSOR_HEIGHT_M, Turn};
 use super::{City, Random, Route};
 use voxtile::scan::Pose;
 
-/// Sensor at an unrelated position at every step: in any street within some distance of the world's origin.
+/// Route that jumps at every step to a random position in a street, within some distance of the world's origin.
 ///
-/// No two steps are near each other, the worst case for caches of near tiles. The iterator yields the sensor's poses
-/// (`world_from_sensor`) without end.
+/// Consecutive positions are far apart, the worst case for caches of recent tiles. The iterator yields the sensor's
+/// poses (`world_from_sensor`) without end.
 #[derive(Clone, Debug)]
 pub struct Teleport {
     seed: u64,
@@ -21,7 +21,7 @@ impl Teleport {
     /// Returns positions in streets at most `reach_m` metres from the origin along either axis, at the height of a
     /// car's sensor.
     pub fn new(seed: u64, reach_m: f64) -> Self {
-        // NaN becomes 0.
+        // The cast converts NaN to 0.
         let reach_blocks = (reach_m.clamp(0.0, FARTHEST_M) / City::BLOCK_M) as i64;
         Self { seed, reach_blocks, height_m: SENSOR_HEIGHT_M, next: 0 }
     }
@@ -77,7 +77,7 @@ mod tests {
     }
 
     #[test]
-    fn a_place_alone_is_the_place_in_sequence() {
+    fn a_single_pose_equals_the_pose_in_sequence() {
         let sequence: Vec<_> = Teleport::new(2, 500.0).take(50).collect();
         let mut teleport = Teleport::new(2, 500.0);
         for index in [49, 0, 17] {
@@ -87,7 +87,7 @@ mod tests {
     }
 
     #[test]
-    fn odd_reaches_have_a_place() {
+    fn every_reach_gives_a_finite_pose() {
         for reach_m in [0.0, -1.0, f64::NAN, f64::INFINITY, 1e300] {
             let pose = Teleport::new(1, reach_m).pose(u64::MAX);
             assert!(pose.isometry().translation.vector.iter().all(|x| x.is_finite()));

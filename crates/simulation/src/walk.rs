@@ -19,7 +19,7 @@ pub struct Walk {
 }
 
 const SENSOR_HEIGHT_M: f64 = 1.4;
-/// Maximum yaw to either side while walking, and the distance per cycle.
+/// Maximum yaw to either side while walking, and the distance walked while the sensor turns left and right once.
 const LOOK_RAD: f64 = 0.4;
 const LOOK_EVERY_M: f64 = 7.3;
 
@@ -173,7 +173,7 @@ mod tests {
     }
 
     #[test]
-    fn odd_spacings_and_indices_have_a_pose() {
+    fn every_spacing_and_index_gives_a_finite_pose() {
         for spacing_m in [0.0, -1.0, f64::NAN, 1e300, f64::MIN_POSITIVE] {
             let pose = Walk::new(Building::new(1), spacing_m).pose(u64::MAX);
             assert!(pose.isometry().translation.vector.iter().all(|x| x.is_finite()));

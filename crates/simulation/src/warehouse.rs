@@ -1,7 +1,7 @@
 use super::{Random, Scene, Solid, World};
 use voxtile::space::Point;
 
-/// Synthetic warehouse of 200 x 100 x 8 m: rows of racks with goods on boards, and aisles between them.
+/// Synthetic warehouse of 200 x 100 x 8 m: rows of racks with goods on shelves, and aisles between them.
 ///
 /// One corner is the world's origin; the floor is the plane z = 0. The racks are the same for all seeds, the goods
 /// differ.
@@ -15,11 +15,11 @@ const WALL_M: f64 = 0.3;
 const ROW_M: f64 = 2.4;
 /// Distance between the middles of two rows.
 const ROW_EVERY_M: f64 = 8.0;
-/// Extent of the racks along a row; the gap is the cross aisle.
+/// Extents along x of the two blocks of racks in a row. The gap between them is the cross aisle.
 const BLOCKS_M: [[f64; 2]; 2] = [[12.0, 94.0], [106.0, 188.0]];
-/// Length of a bay between two uprights.
+/// Length of a bay of a rack, from upright to upright.
 const BAY_M: f64 = 4.1;
-/// Heights of the boards.
+/// Heights of the shelves.
 const BOARDS_M: [f64; 3] = [0.15, 2.1, 4.0];
 const RACK_HEIGHT_M: f64 = 6.0;
 

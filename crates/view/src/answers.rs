@@ -83,7 +83,8 @@ pub fn of_map(
     })
 }
 
-/// Maps an error to a status: the request, a temporary condition, a bucket, or the map.
+/// Returns the HTTP status of an error, which depends on its cause: the request, a temporary condition, a bucket, or
+/// the map.
 fn status_of(error: &Error) -> StatusCode {
     match error {
         Error::InvalidArgument { .. } | Error::TooLarge { .. } => StatusCode::BAD_REQUEST,

@@ -13,7 +13,7 @@ pub struct MapState {
     pub store: Arc<NodeStore>,
     /// Increases with each state that was shown.
     pub generation: u64,
-    /// Number of tiles that are not in the coarse levels yet.
+    /// Number of tiles that are not in the coarse levels of detail yet.
     pub pending_tiles: u64,
 }
 

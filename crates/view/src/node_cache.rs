@@ -3,7 +3,7 @@ use std::path::{Path, PathBuf};
 use voxtile::{Error, Result};
 use voxtile_render::levels::NodeStore;
 
-/// Maximum size of the file; then it is restarted, because most nodes in it belong to obsolete states.
+/// Maximum size of the file. A larger file is emptied, because most of its nodes belong to obsolete states.
 const MAX_BYTES: u64 = 4 << 30;
 
 /// Opens the store of a map's coarse nodes: in the user's cache folder by the map's id, or else in a temporary file if

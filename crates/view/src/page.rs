@@ -10,7 +10,7 @@ pub struct PageFile {
     pub gzip: Bytes,
 }
 
-/// Built by `page/bundle.sh`.
+/// Files of the page, built by `page/bundle.sh`.
 const FILES: [(&str, &str, &[u8]); 4] = [
     ("index.html", "text/html; charset=utf-8", include_bytes!("../page/dist/index.html")),
     ("page.js", "text/javascript; charset=utf-8", include_bytes!("../page/dist/page.js")),

@@ -61,11 +61,11 @@ pub enum Found<T> {
 const POLL_INTERVAL: Duration = Duration::from_millis(500);
 /// Number of tiles in the first coarse levels of a large map, shown while the rest is read.
 const FIRST_TILES: usize = 512;
-/// Factor between successive numbers of tiles.
+/// Factor by which the number of tiles grows from one incomplete state to the next.
 const GROWTH: usize = 4;
 /// Minimum interval between incomplete states.
 const SHOW_EVERY: Duration = Duration::from_secs(1);
-/// Tiles per axis whose coarse nodes are built together, as a power of two.
+/// Binary logarithm of the number of tiles per axis whose coarse nodes are built together.
 const GROUP: u32 = 3;
 /// Maximum number of snapshots with levels in memory.
 const SNAPSHOTS_KEPT: usize = 4;
@@ -141,7 +141,7 @@ impl ServedMap {
         listed
     }
 
-    /// Returns the state of a path.
+    /// Returns the state, or the change between two states, that a URL names.
     pub fn shown(&self, id: &MapId, makes: Makes) -> voxtile::Result<Found<Shown>> {
         let after = match self.state(&id.at, makes)? {
             Found::Here(state) => state,
@@ -156,8 +156,8 @@ impl ServedMap {
         })
     }
 
-    /// Returns the map of a path for queries, without waiting for levels of a snapshot. `None` if there is no such
-    /// snapshot.
+    /// Returns the map that a URL names for queries, without waiting for levels of a snapshot. `None` if there is no
+    /// such snapshot.
     pub fn query_map(&self, id: &MapId) -> voxtile::Result<Option<QueryMap>> {
         if let Some(At::Snapshot(since)) = &id.since
             && self.listed(since).is_none()
@@ -226,7 +226,7 @@ impl ServedMap {
         let work = move || {
             // Taken before the map is read, so that a flush in between is found next time.
             let mut seen = None;
-            let mut told = String::new();
+            let mut reported = String::new();
             loop {
                 let stamp = Stamp::of(&self.at.map);
                 if seen.as_ref() != Some(&stamp) {
@@ -235,9 +235,9 @@ impl ServedMap {
                         // The map was flushed again or removed: keep the shown state and retry.
                         Err(error) => {
                             let error = format!("{error:#}");
-                            if told != error {
+                            if reported != error {
                                 log::warn!("{}: {error}", self.path.display());
-                                told = error;
+                                reported = error;
                             }
                         }
                     }
@@ -291,8 +291,8 @@ impl ServedMap {
     }
 }
 
-/// Returns an origin for tiles without versions, such as those of OctoMap files. Browsers cache nodes forever, so it
-/// must differ from that of any file that a server showed earlier or will show later.
+/// Returns a random number that is part of the versions of tiles whose map records no versions, such as an OctoMap
+/// file. Browsers cache nodes forever, so it must differ for every file that was or will be shown at the same URL.
 fn new_origin() -> u64 {
     RandomState::new().build_hasher().finish()
 }

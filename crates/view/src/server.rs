@@ -30,7 +30,7 @@ use tokio_io_timeout::TimeoutStream;
 const REQUEST_TIMEOUT: Duration = Duration::from_secs(5);
 /// A connection that reads nothing of its response for this time is closed.
 const WRITE_TIMEOUT: Duration = Duration::from_secs(30);
-/// Buffer sizes of a connection for the request, and for the response in addition to its content.
+/// Maximum size of the buffers of a connection: for the request, and for the response in addition to its content.
 const BUFFER_BYTES: usize = 32 << 10;
 /// Interval of keep-alive messages in event streams.
 const KEEP_ALIVE_INTERVAL: Duration = Duration::from_secs(15);
@@ -226,13 +226,13 @@ impl Server {
         let (mut sender, body) = Channel::<Bytes, Infallible>::new(4);
         let (id, maps, mut changed) = (self.id.clone(), self.maps.clone(), self.changed.clone());
         tokio::spawn(async move {
-            let mut told = vec![0; maps.len()];
+            let mut sent = vec![0; maps.len()];
             loop {
                 let mut text = String::new();
                 changed.mark_unchanged();
                 for (number, map) in maps.iter().enumerate() {
                     let generation = map.now().generation;
-                    if std::mem::replace(&mut told[number], generation) != generation {
+                    if std::mem::replace(&mut sent[number], generation) != generation {
                         let map = number.to_string();
                         let data = serde_json::json!({ "map": map, "generation": generation, "server": id });
                         text += &format!("event: changed\ndata: {data}\n\n");

@@ -4,8 +4,8 @@ A ``Map`` takes scans (``insert``) and answers queries of many points, rays and 
 metres, points are arrays of N x 3. Functions of this module work on whole maps on disk. Errors are the
 exceptions of ``voxtile.errors``. Progress callbacks receive the work done and the total.
 
-A forked process lacks the threads of its parent, so it cannot use maps opened there: start processes with
-``spawn`` and open maps in them.
+A forked process lacks the threads of its parent, so it cannot use the maps that its parent has opened: start
+processes with ``spawn`` and open maps in them.
 """
 
 import atexit

@@ -110,7 +110,9 @@ def scans(path: _Path, **options: Unpack[ReadOptions]) -> ScanIterator:
 
 
 def count_scans(path: _Path, **options: Unpack[ReadOptions]) -> int:
-    """Counts the scans of a file or folder. Reads them if their number is not stored, except in ``.scans``."""
+    """Counts the scans of a file or folder. Reads the whole input if it stores no number of scans; ``.scans`` files are
+    counted without decoding the scans.
+    """
     return _count_scans(path, options)
 
 
@@ -144,7 +146,7 @@ def build(
 
     ``BuildOptions`` lists the keywords. ``progress`` is called with the scans done and their number, 0 if that is not
     known. Returns what the command prints with ``--json``; its remarks are warnings, too. If it is interrupted, the map
-    has what was accepted until then, and ``resume=True`` goes on.
+    contains the scans accepted until then, and ``resume=True`` continues the build.
     """
     answer = call_build(path, output, options, progress)
     for remark in answer["remarks"]:

@@ -1,4 +1,4 @@
-"""Functions on whole maps, written with other parts of the package."""
+"""Functions on whole maps that are implemented in Python."""
 
 from __future__ import annotations
 

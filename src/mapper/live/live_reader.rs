@@ -8,8 +8,8 @@ use std::sync::Arc;
 
 /// Handle for querying a map from other threads while its mapper inserts scans and flushes, for example from a planner.
 ///
-/// Each query sees the map as of one scan, including unsaved changes. It does not wait for flushes, and for no disk
-/// access except its own reads. It waits while the mapper changes tiles in memory, which is the shorter part of
+/// Each query sees the map as of one scan, including unsaved changes. A query waits neither for flushes nor for disk
+/// accesses of the mapper. It does wait while the mapper changes tiles in memory, which is the shorter part of
 /// inserting a scan. Use a [`LiveView`] for several queries about the same scan.
 ///
 /// Queries may run on any thread, including in parallel loops on a rayon pool: while the mapper changes tiles, it uses

@@ -9,12 +9,12 @@ use crate::store::TileVersion;
 use crate::tile::{Table, Tile};
 use std::sync::Arc;
 
-/// Map as of one scan, while its mapper continues.
+/// View of a map as of one scan, while its mapper inserts further scans.
 ///
-/// A view does not wait for flushes, and for no disk access except its own reads. Data that change while a view is open
-/// are kept for it, and count towards the mapper's memory limit. Its queries fail with [`Error::Expired`] if these data
-/// exceed an eighth of the limit, or if a tile that did not fit in memory was rewritten. Hold a view for one decision,
-/// not for a mission.
+/// A view waits neither for flushes nor for disk accesses of the mapper. If a tile changes while the view is open, its
+/// old state is kept for the view and counts towards the mapper's memory limit. Queries of the view fail with
+/// [`Error::Expired`] if the old states exceed an eighth of the limit, or if a tile that did not fit in memory was
+/// rewritten. Hold a view for one decision, not for a mission.
 #[derive(Debug)]
 pub struct LiveView {
     shared: Arc<Shared>,
@@ -23,7 +23,7 @@ pub struct LiveView {
     bounds: Option<TileBox>,
 }
 
-/// Number of attempts to read a tile that is moved during the read.
+/// Maximum number of attempts to read a tile: its file may be replaced or renamed during the read.
 const ATTEMPTS: usize = 8;
 
 impl LiveView {
@@ -47,7 +47,7 @@ impl LiveView {
             match self.shared.tile_of(index, &stored) {
                 Ok(tile) => return Ok(Some(tile)),
                 Err(_) if is_past => return Err(Error::Expired),
-                // Rewritten, renamed or removed during the read, or damaged.
+                // The file was rewritten, renamed or removed during the read, or it is damaged.
                 Err(error) => moved = Some(error),
             }
         }
@@ -88,7 +88,7 @@ impl Shared {
         Ok(tile)
     }
 
-    /// Reads a version of a table from its current file.
+    /// Reads a version of a table: from its final file, or from its `*.next` file before the commit.
     fn read_version(&self, index: TileIndex, version: TileVersion) -> Result<Table> {
         let [next, current] = self.files.places(index, version);
         let read =
@@ -115,7 +115,7 @@ impl MapView for LiveView {
     }
 
     fn empty_around(&self, index: TileIndex) -> Option<TileBox> {
-        // Tiles added later can only shrink the box.
+        // Tiles that were added after the view was opened can only make the box smaller.
         self.shared.contents.lock().space().empty_around(index)
     }
 

@@ -4,7 +4,7 @@ use crate::tile::Tile;
 use lru::LruCache;
 use std::sync::Arc;
 
-/// Cache of tiles that readers built from a stored form without updates, in the order of their last use.
+/// Cache of tiles that readers have built, in the order of their last use. Tiles with buffered updates are not cached.
 #[derive(Debug)]
 pub(super) struct ReadTiles {
     tiles: LruCache<TileIndex, ReadTile>,

@@ -5,13 +5,14 @@ use crate::tile::Tile;
 use lru::LruCache;
 use std::collections::BTreeMap;
 
-/// Tiles in the compact form, oldest to newest: the tier between resident tiles and the disk.
+/// Tiles in the compact form, which is compressed, oldest to newest: the tier between resident tiles and the disk.
 #[derive(Debug)]
 pub(super) struct CompactTiles {
     tiles: LruCache<TileIndex, Entry>,
     packer: Packer,
     bytes: usize,
-    /// Dirty tiles that are not being saved, by number: a search in `tiles` would repeatedly pass all clean ones.
+    /// Dirty tiles that are not being saved, by [`Entry::number`]. A search in `tiles` would visit all clean tiles each
+    /// time.
     to_save: BTreeMap<u64, TileIndex>,
     clean: BTreeMap<u64, TileIndex>,
     dirty: usize,

@@ -32,9 +32,10 @@ pub(in crate::mapper) struct TileContents {
     pub(super) views: Views,
     /// Tiles that a background flush needs, while one is running.
     pub(super) pinned: Option<PinnedTiles>,
-    /// Bytes of memory reserved for tiles that only a background flush holds. Zero before the first one; then slightly
-    /// more than the largest so far needed, and than the tiles that one scan changes. Without the reserve, the first
-    /// scan after the beginning of a flush would have to evict as much.
+    /// Bytes of memory reserved for tiles that only a background flush holds. It is zero before the first background
+    /// flush. Later it is 1.25 times the larger of two sizes: the most that a flush has needed, and the tiles that one
+    /// scan changes. Without the reserve, the first scan after the beginning of a flush would have to evict that many
+    /// bytes.
     pub(super) flush_reserve: usize,
     /// Error of the last background flush, until it is reported.
     pub(super) flush_error: Option<Error>,
@@ -192,7 +193,7 @@ impl TileContents {
         self.cache.scans_since_oldest(self.pinned.as_ref())
     }
 
-    /// Bytes of memory by purpose, without those of the disk.
+    /// Bytes of memory by purpose, without those that [`TileDisk`] uses.
     pub(super) fn memory(&self) -> MemoryCounts {
         MemoryCounts {
             write_buffer: self.buffer.bytes() as u64,
@@ -296,7 +297,7 @@ impl TileContents {
         self.pinned.as_ref().map_or(0, PinnedTiles::bytes)
     }
 
-    /// Records that the cache is about to change or drop these tiles.
+    /// Records that the cache is about to change or drop these tiles, so that the flush keeps their current versions.
     pub(super) fn leave_to_flush(&mut self, tiles: impl Iterator<Item = TileIndex>) {
         if let Some(pinned) = &mut self.pinned {
             tiles.for_each(|index| pinned.note_changed(index));
@@ -305,7 +306,7 @@ impl TileContents {
         }
     }
 
-    /// Records that a tile was packed into the compact form without a change.
+    /// Records that a tile was packed into the compact form without a change. The flush then shares the compact form.
     pub(super) fn leave_packed_to_flush(&mut self, index: TileIndex) {
         if let (Some(pinned), Some(packed)) = (&mut self.pinned, self.cache.compact(index)) {
             pinned.note_packed(index, packed);
@@ -314,7 +315,7 @@ impl TileContents {
         }
     }
 
-    /// Raises the memory reserve for flushes to `bytes` and a quarter more.
+    /// Raises the memory reserve for flushes to at least 1.25 times `bytes`.
     fn reserve_for_flush(&mut self, bytes: usize) {
         self.flush_reserve = self.flush_reserve.max(bytes + bytes / 4);
     }
@@ -329,7 +330,8 @@ impl TileContents {
         }
     }
 
-    /// Bytes of memory that changing these tiles needs beyond the reserve.
+    /// Bytes of memory beyond the reserve that a change of these tiles needs, because the flush keeps their old
+    /// versions.
     pub(super) fn bytes_to_copy(&self, tiles: impl Iterator<Item = TileIndex>) -> usize {
         let Some(pinned) = &self.pinned else { return 0 };
         let with_them = pinned.bytes() + pinned.bytes_to_copy(tiles);
@@ -356,14 +358,15 @@ impl TileContents {
             FlushedTile::Compact(index, tile) => drop(self.cache.save_ended(index, &tile, true)),
             FlushedTile::Unapplied(_) => {
                 if self.buffer.thaw(index, true, disk) {
-                    // The version on disk is newer.
+                    // The version on disk is newer than the compact form.
                     self.cache.drop_compact(index);
                 }
             }
         }
     }
 
-    /// Records the end of a background save. A running flush that waits for a failed save writes the tile itself.
+    /// Records the end of a background save. If a running flush waits for this save and the save has failed, the flush
+    /// writes the tile itself.
     pub(super) fn note_saved(&mut self, saved: Saved, disk: &mut TileDisk) {
         let index = saved.index;
         let is_on_disk = saved.result.is_ok();

@@ -9,7 +9,8 @@ use crate::scan::ScanUpdates;
 use crate::space::TileIndex;
 use crate::tile::Tile;
 
-/// Bytes in addition to the voxels of a tile that a scan creates: scan parts, buffered updates and index.
+/// Bytes of memory for each tile that a scan creates, in addition to its voxels: scan parts, buffered updates and
+/// index.
 const BYTES_OF_NEW_TILE: usize = 120;
 
 impl TilePager<'_> {
@@ -103,7 +104,7 @@ impl TilePager<'_> {
             let (of_disk, is_flushing) = (self.bytes_of_disk(), self.contents.is_flushing());
             match self.contents.next_eviction(bytes, tiles, of_disk) {
                 Some(Eviction::Resident(index)) => self.evict(index)?,
-                // It is being written, or cannot be saved before the flush has ended.
+                // The tile is being written, or cannot be saved before the flush has ended.
                 Some(Eviction::Compact(index)) if is_flushing && self.contents.cache.is_dirty(index) => {
                     self.wait_for_background_flush();
                 }
@@ -146,9 +147,9 @@ impl TilePager<'_> {
         Ok(())
     }
 
-    /// Saves tiles that will be evicted soon, as many as may be in progress.
+    /// Begins to save the tiles that will be evicted soon, as many as can be saved at a time.
     fn save_ahead(&mut self) -> Result<()> {
-        // During a background flush only necessary saves are made.
+        // During a background flush, tiles are not saved ahead of their eviction.
         if self.contents.is_flushing()
             || !self.contents.cache.has_compact_tier()
             || self.disk.has_save_error()
@@ -247,8 +248,8 @@ impl TilePager<'_> {
 
     /// Waits until no read or save is running.
     pub(super) fn end_io(&mut self) -> Result<()> {
-        // A tile whose save failed remains dirty and the flush saves it again, so the error is dropped. This precedes
-        // the loading of other tiles, which may wait for a save to get memory.
+        // A tile whose save failed remains dirty and the flush saves it again, so the error is dropped. The saves end
+        // before `end_prefetches`, which may wait for a save to get memory and would return this error.
         let _ = self.end_saves();
         self.end_prefetches()?;
         let _ = self.end_saves();

@@ -84,7 +84,7 @@ impl TilePager<'_> {
         let files = self.store().tables().reader()?;
         let (commit, writer) = self.wait(|disk| disk.begin_commit(&inputs, scan_number))?;
         let mut tiles = self.freeze_buffer();
-        // Does not wait for running saves.
+        // Tiles that are being saved are only listed: this call does not wait for their saves.
         let saving = self.contents.saving_as_they_are();
         let dirty = self.contents.cache.used_last_first().filter(|tile| tile.is_dirty());
         tiles.extend(dirty.cloned().map(|tile| FlushedTile::Resident(Arc::new(PinnedTile::new(tile)))));
@@ -96,10 +96,11 @@ impl TilePager<'_> {
                 list.extend(tile.map(|tile| FlushedTile::Compact(index, tile)));
             }
         }
-        // A tile that has changed since its save began is written after the save.
+        // A tile that has changed since its save began must be written after the save, so these tiles are first in the
+        // list, which is written in reverse order.
         tiles.sort_by_key(|tile| !self.disk.is_saving(tile.index()));
         let after_saves = tiles.iter().take_while(|tile| self.disk.is_saving(tile.index())).count();
-        // The next scan will likely change the same tiles as the last one.
+        // The next scan will likely change the tiles that the last one changed. These are the first resident ones.
         let is_resident = |tile: &FlushedTile| matches!(tile, FlushedTile::Resident(_));
         let residents = tiles.iter().skip(after_saves).position(is_resident);
         let first = residents.map_or(tiles.len(), |first| after_saves + first);
@@ -182,7 +183,8 @@ impl TilePager<'_> {
     /// Rewrites the tiles whose files failed to sync.
     fn rewrite_failed_syncs(&mut self) -> Result<()> {
         for index in self.store().tiles().failed_syncs() {
-            // The file may be incomplete on the medium; the load verifies it.
+            // The file may be incomplete on the medium. The tile is loaded from it, which verifies it, and written
+            // again.
             if !self.contents.cache.is_resident(index) {
                 self.load(index)?;
             }

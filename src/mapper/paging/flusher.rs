@@ -1,7 +1,7 @@
 //! Background flush: a thread writes the tiles as of a scan and commits them, while the mapper inserts other scans.
 //!
 //! Until the commit, the mapper saves no tile: a file with a later version must not take the name of one that the
-//! commit references. If the compact form has no memory left for another dirty tile, the mapper waits for the flush.
+//! commit references. If dirty tiles fill the memory of the compact form, the mapper waits for the flush.
 
 use super::pinned_tile::{PinnedForm, PinnedTile};
 use super::shared_contents::SharedContents;
@@ -60,8 +60,8 @@ pub(super) enum FlushedTile {
 /// Number of tiles that are written between two acquisitions of the locks.
 const NOTED_AT_ONCE: usize = 8;
 
-/// Bytes of files after which written tiles are recorded sooner: a mapper that waits for memory waits for this, and a
-/// slow disk takes some milliseconds for so many bytes.
+/// Bytes of written files after which tiles are recorded, even if they are fewer than [`NOTED_AT_ONCE`]. A mapper that
+/// waits for memory waits for this record, and a slow disk takes some milliseconds for this many bytes.
 const NOTED_BYTES: u64 = 256 << 10;
 
 impl Flusher {
@@ -95,7 +95,7 @@ impl FlushJob {
     fn run(mut self, config: &MapConfig) {
         self.copy_soon_changed();
         let flushed = self.write_tiles(config).and_then(|()| self.commit());
-        // Same lock order as in the mapper.
+        // The locks are taken in the same order as in the mapper, which prevents a deadlock.
         let disk = self.disk.lock();
         let mut contents = self.contents.lock();
         for tile in self.begun.tiles.into_iter().chain(self.begun.compact) {
@@ -104,12 +104,12 @@ impl FlushJob {
         contents.end_background_flush(flushed);
     }
 
-    /// Copies the tiles that the next scan will likely change, to save it this work.
+    /// Copies the tiles that the next scan will likely change, so that the scan need not copy them.
     fn copy_soon_changed(&mut self) {
         let tiles = self.begun.tiles.get_mut(self.begun.soon_changed.clone()).unwrap_or_default();
         for tile in tiles {
             let FlushedTile::Resident(held) = tile else { continue };
-            // A scan may have copied it already.
+            // A scan may already have copied the tile.
             if self.contents.lock().is_shared_with_flush(held.index())
                 && let Some(shared) = held.resident()
                 && held.hold_copy(Tile::clone(&shared))
@@ -157,7 +157,7 @@ impl FlushJob {
                 contents.note_flushed(tile, version, &disk);
             }
             is_behind = contents.cache.is_behind();
-            // There may be no receiver.
+            // A failure is ignored, because there may be no receiver.
             let _ = progress.send(());
             outcome?;
             if is_all {
@@ -222,8 +222,8 @@ impl FlushJob {
 }
 
 impl BegunFlush {
-    /// Returns the next tile to write, first those that will be evicted first: resident tiles, or compact ones if the
-    /// compact tier is full (`is_behind`).
+    /// Returns the next tile to write. Tiles that will be evicted first are written first: resident tiles, or compact
+    /// ones if the compact tier is full (`is_behind`).
     fn next(&mut self, is_behind: bool) -> Option<FlushedTile> {
         let compact = if is_behind { self.compact.pop() } else { None };
         if compact.is_none() && self.tiles.len() > self.after_saves {
@@ -251,7 +251,7 @@ impl BegunFlush {
             }
             FlushedTile::Unapplied(tile) => {
                 let made = tile.make(&self.files, config)?;
-                // The tile may be based on an earlier next version, which the mapper may be reading: keep that file.
+                // The tile may be built from an earlier `*.next` file, which the mapper may be reading: keep this file.
                 let writer = writer.clone().keeping_earlier();
                 saver.write(&writer, tile.index, made.table(), scan_number)
             }

@@ -8,7 +8,7 @@ pub(in crate::mapper) struct MemoryPlan {
     pub(super) tiles: usize,
     /// Limit for all data that grow with the map, in bytes.
     pub(super) bytes: usize,
-    /// Maximum bytes of buffered updates without an index; see [`MemoryPlan::buffer_bytes`].
+    /// Maximum bytes of buffered updates while the index is empty; see [`MemoryPlan::buffer_bytes`].
     buffer_bytes: usize,
     /// Maximum bytes for tracing a scan.
     pub(in crate::mapper) scan_bytes: usize,
@@ -21,14 +21,14 @@ pub(in crate::mapper) struct MemoryPlan {
     pub(super) is_enforced: bool,
     /// Bytes that prefetched tiles must leave free.
     pub(super) spare_bytes: usize,
-    /// Number of scans with buffered updates from which a tile counts as changed often.
+    /// A tile counts as changed often if updates of at least this many scans are buffered for it.
     pub(super) often_scans: u32,
-    /// Maximum bytes of tiles in the compact form without an index; see [`MemoryPlan::compact_bytes`].
+    /// Maximum bytes of tiles in the compact form while the index is empty; see [`MemoryPlan::compact_bytes`].
     compact_bytes: usize,
     index_bytes: usize,
     /// Maximum bytes of tiles that readers in other threads cache.
     pub(in crate::mapper) reader_bytes: usize,
-    /// Maximum bytes of old states kept for views.
+    /// Maximum bytes of old tile states that are kept for open views.
     pub(super) view_bytes: usize,
     /// Maximum bytes of the lists of a background flush.
     pub(super) flush_list_bytes: usize,
@@ -85,7 +85,7 @@ impl MemoryPlan {
         self.index_bytes = bytes;
     }
 
-    /// Maximum bytes of buffered updates; those of one scan may be added.
+    /// Maximum bytes of buffered updates. The updates of one scan may exceed it.
     pub(super) fn buffer_bytes(&self) -> usize {
         self.left_by_index(self.buffer_bytes)
     }
@@ -95,14 +95,15 @@ impl MemoryPlan {
         self.left_by_index(self.compact_bytes)
     }
 
-    /// Returns a share reduced in proportion to the index. All shares are reduced: if only resident tiles were, each
-    /// scan would encode and decode more tiles the larger the map.
+    /// Returns a share reduced in proportion to the size of the index. If the index reduced only the memory of resident
+    /// tiles, scans of large maps would encode and decode many more tiles.
     fn left_by_index(&self, share: usize) -> usize {
         let taken = self.index_bytes.min(self.bytes);
         share - (share as u128 * taken as u128 / self.bytes.max(1) as u128) as usize
     }
 
-    /// Buffered updates are small compared with their tiles; a larger buffer saves reads and writes.
+    /// Returns the plan for a limit in bytes. A quarter is for buffered updates: they are small compared with their
+    /// tiles, and a large buffer saves reads and writes.
     fn of_bytes(bytes: usize) -> Self {
         Self {
             tiles: usize::MAX,

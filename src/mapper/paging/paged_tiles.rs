@@ -71,7 +71,7 @@ impl PagedTiles {
     pub(in crate::mapper) fn end_flush(&self) -> Result<()> {
         while self.flusher.wait() {}
         let mut pager = self.pager();
-        // A thread that panicked has not reported its failure.
+        // If the thread panicked, this reports the failure.
         pager.end_background_flush();
         pager.contents.take_flush_error().map_or(Ok(()), Err)
     }
@@ -96,7 +96,7 @@ mod tests {
     use crate::store::FsDisk;
 
     #[test]
-    fn a_flush_without_a_thread_fails() {
+    fn a_flush_whose_thread_panicked_fails() {
         let folder = tempfile::tempdir().unwrap();
         let (config, map_id) = (MapConfig::new(0.1, 1.0).unwrap(), new_map_id());
         let metadata = new_metadata(&config, map_id, &[]);
@@ -108,7 +108,7 @@ mod tests {
         tiles.contents.lock().pinned = Some(PinnedTiles::default());
         let error = tiles.end_flush().unwrap_err().to_string();
         assert!(error.contains("flush"), "{error}");
-        assert!(tiles.end_flush().is_ok(), "reported once");
+        assert!(tiles.end_flush().is_ok(), "the error is reported once");
         tiles.begin_flush().unwrap();
         assert!(tiles.end_flush().is_ok());
     }

@@ -73,7 +73,7 @@ impl PinnedTile {
         !held.is_being_written
     }
 
-    /// Returns the form to write, and fixes it from now on.
+    /// Returns the form to write. From now on it cannot be replaced.
     pub(super) fn begin_write(&self) -> PinnedForm {
         let mut held = self.lock();
         held.is_being_written = true;

@@ -6,17 +6,18 @@ use crate::space::{TileIndex, hash_table_bytes};
 use rustc_hash::FxHashMap;
 use std::sync::Arc;
 
-/// Tiles that a background flush holds as of its scan, until they are written.
+/// Tiles that a background flush holds, in the state of the scan at which it began, until they are written.
 ///
 /// The flush shares resident tiles with the cache. A scan that changes such a tile copies it, and the flush keeps the
-/// old one (copy on write), which then counts as additional memory. To avoid this delay in the next scan, the flush
-/// copies in advance the tiles that it will change. If a tile is evicted meanwhile, the flush keeps its compact form.
+/// old tile (copy on write), which then counts as additional memory. The copies would delay the next scan. Therefore
+/// the flush copies in advance the tiles that this scan will likely change. If a tile is evicted meanwhile, the flush
+/// keeps its compact form.
 #[derive(Debug, Default)]
 pub(super) struct PinnedTiles {
     tiles: FxHashMap<TileIndex, PinnedEntry>,
     /// Bytes of memory of tiles that only the flush holds.
     own_bytes: usize,
-    /// Bytes of memory of its lists and of one tile that it builds.
+    /// Bytes of memory of the flush's lists and of one tile that it builds.
     other_bytes: usize,
     /// Tiles that were being saved unchanged when the flush began; it waits for these saves and does not write the
     /// tiles.
@@ -34,7 +35,7 @@ pub(super) struct FlushSize {
 }
 
 impl FlushSize {
-    /// Bytes of memory of the lists without the tiles; for small tiles the lists are larger.
+    /// Bytes of memory of the lists, without the tiles. Lists of small tiles take more memory than the tiles.
     pub(super) fn bytes(self) -> usize {
         /// Overhead of the allocator per block.
         const BLOCK: usize = 16;
@@ -98,7 +99,7 @@ impl PinnedTiles {
         self.unsaved
     }
 
-    /// Additional bytes of memory that changing these tiles takes.
+    /// Additional bytes of memory after a change of these tiles: those shared with the cache are copied.
     pub(super) fn bytes_to_copy(&self, tiles: impl Iterator<Item = TileIndex>) -> usize {
         let shared = tiles.filter_map(|index| self.tiles.get(&index)).filter(|tile| tile.is_shared);
         shared.map(|tile| tile.bytes).sum()
@@ -108,14 +109,14 @@ impl PinnedTiles {
         self.tiles.get(&index).is_some_and(|tile| tile.is_shared)
     }
 
-    /// Returns whether an otherwise unpinned tile of the cache may be packed into the compact form.
+    /// Returns whether a tile of the cache that only the flush pins may be packed into the compact form.
     pub(super) fn may_be_packed(&self, index: TileIndex) -> bool {
         let tile = self.tiles.get(&index).filter(|tile| tile.is_shared);
         tile.and_then(|tile| tile.held.as_ref()).is_some_and(|held| held.may_be_packed())
     }
 
-    /// Records that a tile of the cache is packed into the compact form unchanged. The flush then releases the tile
-    /// itself, unless it is about to be written or the flush holds an earlier version.
+    /// Records that a tile of the cache is packed into the compact form unchanged. The flush then holds the compact
+    /// form instead of the tile, unless it is writing the tile or holds an earlier version.
     pub(super) fn note_packed(&mut self, index: TileIndex, packed: &CompactTile) {
         if let Some(tile) = self.tiles.get_mut(&index)
             && tile.is_shared

@@ -19,7 +19,7 @@ impl TilePager<'_> {
         if !self.contents.cache.has_compact_tier() {
             return;
         }
-        // These would have to be loaded soon.
+        // When the buffer is full, the tiles with the most updates must be loaded, so they are prefetched now.
         for tile in self.contents.heaviest_beyond(self.plan().buffer_bytes() / 4 * 3) {
             if !self.is_spilling_cheaper(tile) {
                 self.begin_prefetch(tile);

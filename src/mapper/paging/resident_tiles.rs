@@ -80,12 +80,12 @@ impl ResidentTiles {
         }
     }
 
-    /// The least recently used tile that has no other owner, or only one that releases it.
+    /// The least recently used tile that may be evicted: it has no other owner, or it has one and `releases` is true.
     pub(super) fn least_recently_used(&self, releases: impl Fn(TileIndex) -> bool) -> Option<TileIndex> {
         self.oldest(releases).map(|resident| resident.tile.index())
     }
 
-    /// Number of scans since the last use of that tile.
+    /// Number of scans since the last use of the tile that [`Self::least_recently_used`] returns.
     pub(super) fn scans_since_oldest(&self, releases: impl Fn(TileIndex) -> bool) -> Option<u64> {
         self.oldest(releases).map(|resident| self.scans - resident.used)
     }

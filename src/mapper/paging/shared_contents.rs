@@ -12,8 +12,8 @@ pub(in crate::mapper) struct SharedContents {
     closed: Condvar,
 }
 
-/// Longest time that a scan waits for a view to close. Most views last a few milliseconds, and copying the tiles that a
-/// lidar scan changes takes longer than this.
+/// Longest time that a scan waits for a view to close. Most views last a few milliseconds, so waiting is usually faster
+/// than copying the tiles that a lidar scan changes.
 const MAX_WAIT: Duration = Duration::from_millis(20);
 
 pub(in crate::mapper) type ContentsGuard<'a> = MutexGuard<'a, TileContents>;
@@ -44,7 +44,7 @@ impl SharedContents {
         let dropped = contents.views.close(view);
         drop(contents);
         self.closed.notify_all();
-        // After the lock is released, because freeing copies of tiles takes time.
+        // Dropped after the lock is released, because freeing copies of tiles takes time.
         drop(dropped);
     }
 }

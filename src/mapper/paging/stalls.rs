@@ -50,7 +50,7 @@ mod tests {
         (1..=1000).for_each(|ms| stalls.note(Duration::from_millis(ms)));
         let StallCounts { count, p50_us, p99_us, worst_us } = stalls.counts();
         assert_eq!(count, 1000);
-        // To two significant digits.
+        // The histogram keeps two significant digits, so an error of 1 % is allowed.
         for (found, expected) in [(p50_us, 500_000), (p99_us, 990_000), (worst_us, 1_000_000)] {
             assert!(found.abs_diff(expected) * 100 <= expected, "{found} us, {expected} expected");
         }

@@ -34,7 +34,7 @@ pub(super) struct TileCache {
 
 /// Next step of an eviction.
 pub(super) enum Eviction {
-    /// Move a resident tile one tier down.
+    /// Move a resident tile to the compact form, or to disk if there is no compact tier.
     Resident(TileIndex),
     /// Drop a tile in the compact form, after it was saved.
     Compact(TileIndex),

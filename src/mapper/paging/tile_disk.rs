@@ -211,7 +211,7 @@ impl TileDisk {
     }
 
     /// Records the end of a save; returns the version that is on disk now. `is_current` is whether the tile in memory
-    /// is still the saved version; otherwise it is written again, and an error is ignored.
+    /// is still the saved version. If not, the tile will be written again, so an error is ignored.
     pub(super) fn note_saved(&mut self, saved: Saved, is_current: bool) -> Option<TileVersion> {
         let Saved { index, result, .. } = saved;
         match result {

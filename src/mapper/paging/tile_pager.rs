@@ -43,7 +43,7 @@ const MAX_SPILLED_BYTES: u64 = 1 << 20;
 /// A tile with fewer bytes of updates is never read only to apply them.
 const MIN_BYTES_TO_LOAD_FOR: u64 = 1 << 14;
 
-/// New tiles are created in groups of about so many bytes, so that their actual size is known before the next group.
+/// Approximate bytes of a group of new tiles. The actual size of a group is measured before the next one is created.
 const BYTES_OF_NEW_TILES: usize = 4 << 20;
 
 /// Approximate bytes of memory of a new tile with these updates.
@@ -53,7 +53,8 @@ fn bytes_of_new_tile(updates: &TileUpdates) -> usize {
     TILE + match updates {
         TileUpdates::Masks(bricks) => BRICK * bricks.len(),
         TileUpdates::Runs(runs) => BRICK * runs.brick_count(),
-        // A packed brick with few voxels takes about 25 bytes; with many voxels it grows with them.
+        // A packed brick with few voxels takes about 25 bytes. Bricks with many voxels take more, in proportion to
+        // their voxels.
         TileUpdates::Packed(packed) => BRICK / 25 * packed.bytes(),
         TileUpdates::Ordered(updates) => 8 * updates.len(),
     }
@@ -95,7 +96,7 @@ impl TilePager<'_> {
         self.unpack_often_changed(updates)?;
         let all: usize = updates.tiles.iter().map(|(_, updates)| updates.len()).sum();
         let copied = self.contents.bytes_to_copy(updates.tiles.iter().map(|(tile, _)| *tile));
-        // A tile that the updates create is an additional tile.
+        // No memory is freed for new tiles: if one does not fit, `accept` buffers its updates.
         self.make_room_for(BYTES_OF_UPDATE * all + copied)?;
         self.keep_pace();
         Ok(())
@@ -165,13 +166,13 @@ impl TilePager<'_> {
         });
     }
 
-    /// Records that the last number belongs to a batch.
+    /// Records that the last scan number belongs to a batch of points, not to a scan.
     pub(in crate::mapper) fn note_batch(&mut self) {
         let number = self.contents.scan_number;
         self.disk.note(CatalogEntry::Unlisted(number, number));
     }
 
-    /// Continues the scan numbers after this one.
+    /// Sets the number of the last scan; the next scan gets the following number.
     pub(in crate::mapper) fn set_scan_number(&mut self, number: u64) {
         self.contents.scan_number = number;
     }
@@ -260,7 +261,7 @@ impl TilePager<'_> {
     }
 
     fn load_buffered(&mut self, tile: TileIndex) -> Result<()> {
-        // It may have been loaded by an earlier iteration.
+        // An earlier iteration may have loaded the tile.
         if self.contents.has_applicable(tile) {
             self.load(tile)?;
         }

@@ -41,7 +41,7 @@ impl UnappliedTile {
         Ok(tile)
     }
 
-    /// Bytes of memory that other owners may release meanwhile.
+    /// Bytes of memory of the compact form and the updates. Other owners may release these while the flush holds them.
     pub(super) fn bytes(&self) -> usize {
         let base = if let Base::Compact(tile) = &self.state.base { tile.bytes().len() } else { 0 };
         base + self.state.updates.as_ref().map_or(0, |updates| updates.bytes())

@@ -77,7 +77,7 @@ impl Views {
             released.extend(states.drain(..kept).map(|(_, state)| state));
             !states.is_empty()
         });
-        // A pointer tree that another thread writes may have grown since it was counted.
+        // Saturates, because a pointer tree that another thread writes may have grown since it was counted.
         let bytes = released.iter().map(TileState::bytes).sum();
         self.past_bytes = self.past_bytes.saturating_sub(bytes);
         released

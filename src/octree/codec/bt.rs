@@ -172,7 +172,8 @@ impl PrunedDepths {
     pub(super) const ALL: Self = Self(1);
 
     /// Returns the depths that OctoMap's `prune` reaches: from the depth above the voxels upward, to the first depth
-    /// without a prunable node. `prunable` is the number of nodes by depth that can be pruned once all below them are.
+    /// without a prunable node. `prunable` has the number of prunable nodes by depth, if all nodes below them are
+    /// pruned.
     pub(super) fn of(prunable: &[u64; DEPTH as usize]) -> Self {
         let lowest = (1..DEPTH).rev().take_while(|&depth| prunable[usize::from(depth)] > 0).last();
         lowest.map_or(Self::NONE, Self)
@@ -189,7 +190,7 @@ impl PrunedDepths {
     }
 }
 
-/// Counts by depth the nodes that can be pruned once all below them are; returns the code of `node`.
+/// Counts the nodes by depth that can be pruned if all nodes below them are pruned. Returns the code of `node`.
 fn count_prunable(
     tree: &Octree,
     node: Node,

@@ -117,7 +117,8 @@ impl BtEncoder {
 }
 
 impl BtNode {
-    /// Creates a leaf below the depth of bricks, where the masks of the brick already contain which values are equal.
+    /// Creates a leaf below the depth of bricks. It needs no value, because the masks of the brick record which values
+    /// are equal.
     const fn leaf(code: Code) -> Self {
         Self { code, leaf: None, nodes: 1 }
     }

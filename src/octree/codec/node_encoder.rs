@@ -30,7 +30,7 @@ pub(super) trait NodeEncoder {
     fn append_leaf(node: &Self::Node, payload: &mut Vec<u8>);
 }
 
-/// Number of nodes by depth that could be pruned once all below them were.
+/// Number of nodes by depth that can be pruned if all nodes below them are pruned.
 pub(super) type Prunable = [u64; DEPTH as usize];
 
 /// Appends the bytes of the node at `depth` (at most that of a brick) over these ascending `bricks`; `encode_brick`

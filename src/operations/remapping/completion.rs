@@ -12,8 +12,9 @@ pub(super) fn release(store: &mut TileStore) -> Result<()> {
     store.release_scans()
 }
 
-/// Removes the shadow map of a killed online remap, because it has the evidence of all scans. A map that happens to
-/// have this name has another id and is kept. A killed removal leaves a folder without the files that contain the id.
+/// Removes the shadow map of a killed online remap, because it still has the evidence of the scans to remove. A map
+/// that happens to have this name has another id and is kept. A killed removal leaves a folder without the files that
+/// contain the id.
 ///
 /// # Errors
 ///
@@ -35,9 +36,11 @@ pub(super) fn remove_second_map(disk: Arc<dyn Disk>, folder: &Path) -> Result<()
         }
     }
     match SideFolder::begin(disk, folder) {
-        // Another process uses it, or the path has no name, so there can be no such folder.
+        // `Locked`: another process uses the folder. `InvalidArgument`: the map's path has no name, so there can be no
+        // such folder.
         Ok(_) | Err(Error::Locked { .. } | Error::InvalidArgument { .. }) => Ok(()),
-        // A folder that happens to have this name: a removal starts only if all its content belongs to a map.
+        // The folder has other content, so it only happens to have this name. It is kept: only folders of maps are
+        // removed.
         Err(Error::AlreadyExists { .. }) if !has_id => Ok(()),
         Err(error) => Err(error),
     }
@@ -54,7 +57,7 @@ pub(super) fn complete_earlier(disk: Arc<dyn Disk>, folder: &Path) -> Result<u64
     let idle =
         TileStore::open_read_only(disk.clone(), folder)?.snapshots().idle_scan_files()?.unwrap_or_default();
     match TileStore::open(disk.clone(), folder) {
-        // The other writer has removed them when it opened the map.
+        // Another writer may have the map open. No files remain, because a writer removes them when it opens the map.
         Err(_) if idle.is_empty() => {}
         opened => opened.and_then(|mut store| release(&mut store)).map_err(with_hint)?,
     }

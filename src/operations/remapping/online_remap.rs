@@ -66,7 +66,7 @@ impl OnlineRemap {
         let is_needed = revision.counts.scans_changed > 0;
         let begin = || ShadowMapper::begin(&store, touched.config.clone(), how.replay.stop.clone());
         let side = is_needed.then(begin).transpose()?;
-        // They are counted again while the scans are processed.
+        // `follow` counts the scans and updates again while it processes them.
         (revision.counts.scans, revision.counts.updates) = (0, 0);
         drop(store);
         let (folder, how, catalog) = (folder.to_owned(), how.clone(), scans.catalog());
@@ -104,8 +104,8 @@ impl OnlineRemap {
         self.threads.install(&mut follow)
     }
 
-    /// Changes the map, after its mapper has flushed and was closed. First processes scans that were flushed since
-    /// [`OnlineRemap::follow`]; then one commit replaces the affected tiles.
+    /// Applies the new poses to the map. Call this after the map's mapper has flushed and was closed. First processes
+    /// the scans that were flushed since [`OnlineRemap::follow`]; then one commit replaces the affected tiles.
     ///
     /// # Errors
     ///
@@ -139,7 +139,7 @@ impl OnlineRemap {
     }
 }
 
-/// Inserts the scans after the first `entries` entries into the affected tiles.
+/// Inserts the scans after the first `entries` entries of the catalog into the affected tiles.
 fn follow_scans(
     store: &TileStore,
     catalog: Option<u64>,

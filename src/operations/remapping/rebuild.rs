@@ -28,7 +28,8 @@ pub struct Rebuilt {
 ///
 /// A map that keeps no scans or has other scans too; a region whose borders are not borders of the new tiles; an
 /// invalid configuration; a folder with other content; another process that creates the same map; damage; an I/O error;
-/// a request to stop. There is no map then, unless only the last step, the sync of its name, has failed.
+/// a request to stop. There is no map then. The exception is a failure of the last step, the sync of the folder that
+/// contains the map.
 pub fn rebuild(
     map: &MapReader,
     output: impl Into<MapPath>,

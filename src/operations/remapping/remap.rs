@@ -13,8 +13,8 @@ use serde::Serialize;
 pub struct Remap {
     /// Options of the replay.
     pub replay: Replay,
-    /// Maximum translation in metres and rotation in radians of scans that keep their pose. Default: every scan gets
-    /// its new pose.
+    /// Scans whose new pose differs by at most this translation in metres and rotation in radians keep their old pose.
+    /// Default: every scan gets its new pose.
     pub tolerance: Option<(f64, f64)>,
 }
 

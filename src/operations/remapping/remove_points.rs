@@ -56,7 +56,7 @@ pub fn remove_points(
     };
     let mapped = replay(&summary, changes, how, progress)?;
     if mapped.scans_changed == 0 && !how.is_dry_run {
-        // An earlier call may have been killed after its commit.
+        // Remove the files of an earlier call that may have been killed after its commit.
         complete_earlier(disk, &folder)?;
     }
     Ok(PointsRemoved { mapped, points_removed })

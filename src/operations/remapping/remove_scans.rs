@@ -53,8 +53,9 @@ pub struct SnapshotFailure {
 /// reused.
 ///
 /// If a removal was killed after its commit, the same call, or the next process that opens the map for writing, removes
-/// the remaining files. A call whose scans were removed before succeeds and removes no scan. For a time range without
-/// scans it cannot be known whether scans were removed, unless files remain.
+/// the remaining files. A call whose scans were removed before succeeds and removes no scan. The map does not record
+/// the times of removed scans. For a time range without scans, a call therefore recognises an earlier removal only if
+/// files of it remain.
 ///
 /// Snapshots are unchanged and keep these scans, unless `from_snapshots` is set: then those that contain any of the
 /// scans are deleted individually, after the scans are removed from the map. After an interruption, or at any later
@@ -77,7 +78,7 @@ pub fn remove_scans(
     let (mut removed, is_repeated) = remove_from_map(path, scans, from_snapshots, how, progress)?;
     let (mut first_error, deletes) = (None, from_snapshots && !how.is_dry_run);
     for name in TileStore::open_read_only(disk.clone(), &folder)?.snapshots().names()? {
-        // The snapshot `keep_as` is not deleted.
+        // The snapshot `keep_as` is kept, although it contains the scans.
         let deletes = deletes && how.keep_as.as_ref() != Some(&name);
         if let Err(error) = removed.handle_snapshot(path, name.clone(), scans, deletes) {
             removed.snapshots_failed.push(SnapshotFailure { name, reason: format!("{error:#}") });
@@ -110,7 +111,7 @@ fn remove_from_map(
     let (summary, selection) = (reader.kept_summary()?, Selection::of(scans, &reader));
     let changes = selection.removals(&summary);
     let refusal = none_selected(scans, &reader);
-    // While the reader is open, replaced tables would be kept for it.
+    // Close the reader before the replay: replaced tables would be kept for it.
     drop(reader);
     let was_removed = selection.has_removed(&summary);
     if !changes.is_empty() || !from_snapshots && !was_removed {
@@ -191,7 +192,8 @@ impl Selection {
         selected.map(|scan| (scan.number, Change::Remove)).collect()
     }
 
-    /// Returns whether it includes numbers of removed scans. Unknown for times.
+    /// Returns whether the selection includes numbers of removed scans. False for times: those of removed scans are not
+    /// recorded.
     fn has_removed(&self, scans: &KeptSummary) -> bool {
         let Self::Numbers(ranges) = self else { return false };
         scans

@@ -18,7 +18,7 @@ pub struct Replay {
     pub memory: MemoryLimit,
     /// Name of a new snapshot of the map before the change. Default: none.
     pub keep_as: Option<SnapshotName>,
-    /// Whether only to report the work without doing it. Default: no.
+    /// Whether the replay is only estimated and the map is unchanged. Default: no.
     pub is_dry_run: bool,
     /// Request to stop. After a stop the map is unchanged.
     pub stop: Stop,
@@ -35,7 +35,7 @@ impl Replay {
         Self { keep_as: keep_as.into(), ..self }
     }
 
-    /// Sets whether only to report the work.
+    /// Sets whether the replay is only estimated.
     pub fn with_dry_run(self, is_dry_run: bool) -> Self {
         Self { is_dry_run, ..self }
     }
@@ -84,7 +84,7 @@ pub(super) fn replay(
     let mut revision = Revision::new(scans, how, changes);
     let takes_points = revision.takes_points();
     if takes_points {
-        // Before the search for affected tiles, which can take long.
+        // Checked before the search for affected tiles, which can take long.
         store.snapshots().check_catalogs()?;
     }
     let touched = revision.look(&store)?;
@@ -96,7 +96,7 @@ pub(super) fn replay(
         clean_up_after_error(disk.clone(), folder, revision.map(store, touched, &mut progress))?;
     let second = if takes_points { remove_second_map(disk.clone(), folder) } else { Ok(()) };
     match released {
-        // Removed points must not remain: retry after reopening the map.
+        // The removed points must not remain in files: `complete` opens the map again and retries.
         Err(_) if takes_points => complete(disk, folder)?,
         Err(error) => log::warn!("{}: committed, but the cleanup failed: {error:#}", folder.display()),
         Ok(()) => {}

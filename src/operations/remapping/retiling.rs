@@ -38,15 +38,16 @@ impl Retiling {
         }
     }
 
-    /// Returns the first and last of the other tiles along an axis. The limits of the index range represent a region
-    /// without a border.
+    /// Converts the first and last tile of a region along an axis to new tiles. The limits of the index range represent
+    /// a region without a border.
     fn edge(&self, first: i32, last: i32) -> Option<(i32, i32)> {
         let begin = if first == i32::MIN { first } else { self.border(i64::from(first))? };
         let end = if last >= i32::MAX - 1 { i32::MAX } else { self.border(i64::from(last) + 1)? };
         (begin < end).then(|| (begin, end - 1))
     }
 
-    /// Returns the tile that begins at the lower border of this one.
+    /// Returns the number of the new tile that begins where the old tile `number` begins; `None` if no new tile begins
+    /// there.
     fn border(&self, number: i64) -> Option<i32> {
         let exact = number as f64 * self.from_m / self.to_m;
         let whole = exact.round();

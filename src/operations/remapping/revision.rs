@@ -35,7 +35,7 @@ pub(super) struct Revision {
     disk: Arc<dyn Disk>,
     how: Replay,
     changes: Changes,
-    /// Segments of points that are removed.
+    /// Segments of the archive that contain points to remove. Their other points are copied to new segments.
     segments: BTreeSet<u64>,
     /// Updates of the changed scans.
     changed_updates: u64,
@@ -99,8 +99,8 @@ impl Revision {
         Ok(touched)
     }
 
-    /// Returns the tiles that changed scans touch before and after. Adds the updates of scans that were traced to find
-    /// them to `looked_at`.
+    /// Returns the tiles that changed scans touch before and after. Adds to `looked_at` the updates of the scans that
+    /// are traced to find these tiles.
     fn tiles_of_changes(
         &self,
         store: &TileStore,
@@ -133,7 +133,8 @@ impl Revision {
         }
         let removes_points = self.changes.values().any(|change| matches!(change, Change::Filter(_)));
         if removes_points && config.rays.clearing().guard().is_some() {
-            // Without a point, misses of other rays nearby may count in full, also in tiles that its ray did not pass.
+            // With guarded clearing, a removed hit may change nearby misses from weak to full, also in tiles that its
+            // ray did not pass.
             let reach = config.grid.tiles_within(GUARD_REACH);
             let near = |tile| TileBox::new(tile, tile).grown(reach).tiles();
             tiles = tiles.into_iter().flat_map(near).filter(|tile| store.tiles().contains(*tile)).collect();
@@ -156,7 +157,8 @@ impl Revision {
             }
         }
         (self.counts.scans_mapped, self.counts.updates_mapped) = (scans, updates as u64);
-        // Without a measurement, assume 20 million updates per second. Applying and writing add one half.
+        // Without a measurement, assume 20 million updates per second. Applying and writing the updates adds half of
+        // the time.
         let rate = if looked_at > 0 { looked_at as f64 / took_s.max(1e-6) } else { 20e6 };
         self.counts.estimated_s = Some(1.5 * updates / rate);
         Ok(())
@@ -179,7 +181,7 @@ impl Revision {
     }
 
     /// Applies the change of a scan with `map`, which inserts its points into a selection of tiles or into all. Returns
-    /// its new entry. Only poses may change.
+    /// its new entry. The changes may contain new poses only, no removals.
     pub(super) fn apply_change(
         &mut self,
         layout: &Layout,

@@ -13,9 +13,10 @@ pub(super) enum Form {
     Bits(Width),
     /// Differences from the value a given number of points before.
     Differences(Width, u8),
-    /// Differences of positions on a grid from the one before; some values deviate by a few units in the last place.
+    /// For values that are multiples of a step: differences between consecutive multiples. A second list contains the
+    /// deviations of values from their multiples, in units in the last place.
     Steps(Width, Grid),
-    /// Differences of pixels from the one before.
+    /// For coordinates of a depth image: differences between each pixel and its prediction.
     Pixels(Arc<Pinhole>),
 }
 
@@ -26,9 +27,10 @@ const PARTS: u8 = 3;
 const PIXELS: u8 = 4;
 const IS_WIDE: u8 = 0x80;
 
-/// Distances between points with similar values: neighbours, and the beams of sensors that fire in turn.
+/// Distances in the list between points with similar values: 1 for neighbours; 2 and 4 for sensors whose beams fire in
+/// turn.
 const LAGS: [u8; 3] = [1, 2, 4];
-/// Number of values from which the form of a column is chosen.
+/// Number of sampled values by which the form of a column is chosen.
 const SAMPLE_SIZE: usize = 1 << 14;
 /// Number of consecutive blocks that reuse a form before other forms are tried again.
 const BLOCKS_ALIKE: u32 = 32;
@@ -73,7 +75,8 @@ impl ColumnWriter {
             self.chosen[column % COLUMNS] = Some((form, 0));
             return Ok(());
         }
-        // Some values are not on the grid of the others. The next block may fit again.
+        // Some values do not fit the grid or the camera that the sample suggested. The form used instead is not
+        // remembered, because the next block may fit a grid again.
         let form = self.choose(values, width, false)?;
         self.put_form(values, depths, &form, out).map(drop)
     }

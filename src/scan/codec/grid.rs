@@ -43,7 +43,8 @@ const MAX_STEPS: f64 = 2_251_799_813_685_248.0;
 /// multiples if the program that wrote the file added an offset.
 const MAX_ULPS: u64 = 100;
 
-/// Grid of multiples of a step, or of fractions of a unit. Readers multiply or divide, which differs in the last place.
+/// Grid of multiples of a step. Programs that read sensor files either multiply an integer by the step, or divide it by
+/// the number of steps per unit; the results differ in the last place.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Grid {
     /// Multiples of this step.
@@ -79,12 +80,12 @@ impl Grid {
             Self::Times(step) => value / step,
             Self::Over(parts) => value * parts,
         });
-        // False for NaN.
+        // A NaN is not whole: this comparison is false for it.
         let is_whole = steps.abs() < MAX_STEPS;
         if !is_whole {
             return None;
         }
-        // The integer merges both zeros; the negative one has a deviation of one unit.
+        // As an integer, -0.0 becomes 0. It is restored by a deviation of one unit.
         let steps = steps as i64;
         let of_steps = width.ordered(width.bits(self.value(steps)));
         let apart = width.ordered(width.bits(value)).wrapping_sub(of_steps) as i64;

@@ -42,7 +42,7 @@ impl Pinhole {
         ratios.dedup_by(|a, b| (*a - *b).abs() < SAME);
         let gap = ratios.windows(2).map(|pair| pair[1] - pair[0]).reduce(f64::min)?;
         let (first, last) = (*ratios.first()?, *ratios.last()?);
-        // The gap is much more exact from the whole span than from two neighbours.
+        // The smallest gap between two ratios is a rough pixel size. Longer and longer spans make it more exact.
         let (mut focal, mut reach) = (1.0 / gap, gap);
         for &ratio in &ratios {
             if ratio - first > 4.0 * reach || ratio == last {
@@ -67,8 +67,8 @@ impl Pinhole {
             let unit = 10_f64.powi(decimals);
             let focal = (focal * unit).round() / unit;
             let part = (-first * focal * unit).round().rem_euclid(unit) / unit;
-            // Rounding yields the offset of the centre in whole pixels. Pixel indices start at 0: `least` is the
-            // smallest centre with this fractional part.
+            // The fractional part of the centre is known, but not its whole pixels. Pixel indices start at 0, so
+            // `least` is the smallest possible centre.
             let least = (-(first * focal + part)).ceil().max(0.0);
             let mut centers = (0..MAX_PIXELS).map(|pixels| least + pixels as f64 + part);
             let center = centers.find(|center| makes(focal, *center));
@@ -90,7 +90,7 @@ impl Pinhole {
     /// Returns the pixel whose coordinate equals `value` bit by bit, trying `expected` first; `None` if there is none.
     #[inline]
     fn pixel(&self, value: f64, z: f64, expected: i64) -> Option<i64> {
-        // The bits of a NaN depend on the processor.
+        // A NaN never matches: the bits of a computed NaN depend on the processor.
         let is_it = |pixel| self.value(pixel, z).to_bits() == value.to_bits() && !value.is_nan();
         if is_it(expected) {
             return Some(expected);
@@ -99,8 +99,9 @@ impl Pinhole {
         (pixel.abs() < 1e6 && is_it(pixel as i64)).then_some(pixel as i64)
     }
 
-    /// Converts coordinates to words: differences between each pixel and the one predicted from those before it. If the
-    /// depth is missing, the coordinate must equal it. Returns `false` if a coordinate has no pixel.
+    /// Converts coordinates to words: differences between each pixel and the one predicted from those before it. For a
+    /// point without a depth, the coordinate must have the same bits as the depth. Returns `false` if a coordinate has
+    /// no pixel.
     pub(super) fn words(&self, values: &[f64], depths: &[f64], words: &mut Vec<u64>) -> bool {
         let mut row = Expected::default();
         for (value, z) in values.iter().zip(depths) {
@@ -116,7 +117,7 @@ impl Pinhole {
         true
     }
 
-    /// Converts such words back to coordinates.
+    /// Converts the words of [`Pinhole::words`] back to coordinates.
     pub(super) fn values(&self, words: &[u64], depths: &[f64], values: &mut Vec<f64>) {
         let mut row = Expected::default();
         for (word, z) in words.iter().zip(depths) {
@@ -143,7 +144,8 @@ impl Expected {
     #[inline]
     fn follow(&mut self, pixel: i64) {
         let step = pixel.wrapping_sub(self.last);
-        // At the end of a row the pixel jumps back; the step of the ended row also applies to the next.
+        // Other steps are jumps, such as from the end of a row to its start. The step within a row is the same in the
+        // next row.
         if (0..=1).contains(&step) {
             self.step = step;
         }

@@ -11,9 +11,9 @@ const CONSTANT: u8 = 2;
 /// Bytes grouped by the next higher byte of their words.
 const GROUPED: u8 = 3;
 
-/// Fast, and compresses these planes as well as higher levels do.
+/// Compression level of zstd. It is fast, and compresses these planes as well as higher levels do.
 const LEVEL: i32 = 1;
-/// Smaller groups are merged, because each group has its own entropy table.
+/// Minimum number of bytes in a group. Smaller groups are merged, because each group has its own entropy table.
 const MIN_GROUP: usize = 1024;
 /// Approximate size of such a table in bytes.
 const TABLE_BYTES: f64 = 80.0;
@@ -302,7 +302,7 @@ fn decompress(
 
 /// Creates a compressor that omits headers and checksums.
 fn compressor() -> io::Result<CCtx<'static>> {
-    // `zstd::bulk` would panic if this fails.
+    // Returns an error if memory is exhausted, where `zstd::bulk` would panic.
     let mut zstd = CCtx::try_create().ok_or(io::ErrorKind::OutOfMemory)?;
     for parameter in [
         CParameter::CompressionLevel(LEVEL),

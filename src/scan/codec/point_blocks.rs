@@ -58,7 +58,7 @@ impl PointBlocks {
         }
         let (points, intensities) = (std::mem::take(&mut self.points), std::mem::take(&mut self.intensities));
         let ended = self.encode(&points, has_intensities.then_some(&*intensities), put);
-        // Reuse their memory.
+        // Put the lists back, so that the next scan reuses their memory.
         (self.points, self.intensities) = (points, intensities);
         self.begin();
         ended

@@ -25,7 +25,7 @@ impl Width {
     /// Returns whether this width represents all values exactly.
     pub(super) fn has(self, values: &[f64]) -> bool {
         let has_lost = |lost: u64, value: &f64| lost | (f64::from(*value as f32).to_bits() ^ value.to_bits());
-        // The first condition is branchless and decides all cases without NaN.
+        // The fold is branchless and decides all cases without NaN.
         self == Self::Wide
             || values.iter().fold(0, has_lost) == 0 && !values.iter().any(|value| value.is_nan())
             || values.iter().all(|value| narrow(*value).is_some())

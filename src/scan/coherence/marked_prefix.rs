@@ -2,12 +2,12 @@ use super::cone::{CELLS, CELLS_PER_SIDE, Cone, SIDES, cell_of};
 use crate::scan::pages::{MarkedPage, PageMap};
 use crate::scan::ray::{RayCut, RayOrigin, SlabRay};
 
-/// Number of slabs at the start of a ray that rays of nearly the same direction have already marked.
+/// For each cone of directions, the number of slabs at the start of its rays in which all voxels are already marked.
 ///
-/// The directions from the sensor are divided into cones. The marked prefix of a cone is the longest run of slabs, from
-/// the sensor on, in which each voxel that rays of the cone can reach is marked. A ray of the cone starts after the
-/// prefix, or is skipped if it ends within. Where rays are dense, most rays are skipped or almost skipped. The marks
-/// are the same as without prefixes.
+/// Slabs are layers, one voxel thick, across the main axis of a ray. The marked prefix of a cone is the longest run of
+/// slabs, from the sensor on, in which each voxel that rays of the cone can reach is marked. A ray of the cone starts
+/// after the prefix, or is skipped if it ends within. Where rays are dense, most rays are skipped or almost skipped.
+/// The marks are the same as without prefixes.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct MarkedPrefixes {
     /// Indexed by [`cell_of`].
@@ -106,7 +106,7 @@ fn extend_side<const A: usize, const B: usize, const C: usize>(
         while slabs <= farthest && is_marked(slabs) {
             slabs += 1;
         }
-        // For unused cones it is unknown whether the slabs before are marked.
+        // The minimum above ignores unused cones, so their first slabs may be unmarked.
         for cell in of_square {
             if cones[cell].is_used() {
                 cones[cell].slabs = cones[cell].slabs.max(slabs);

@@ -1,6 +1,6 @@
 use std::ops::Range;
 
-/// Prime, so that no pass has only rays of some of the sensor's beams.
+/// Stride of the passes through the points. It is prime, so that each pass has rays of all beams of the sensor.
 const STRIDE: usize = 17;
 
 /// Remainders modulo the stride of the points in each pass. The first two passes are spread over the scan.
@@ -12,10 +12,10 @@ const SQUARES: [&[usize]; 3] = [&[], &[8, 4, 2], &[4, 2, 1]];
 /// Like `SQUARES`, for fewer than [`MANY_POINTS`]: such sparse rays share too little to justify the smallest squares.
 const SQUARES_OF_FEW: [&[usize]; 3] = [&[], &[8, 4], &[4, 2]];
 
-/// About three rays per smallest square.
+/// Number of points of a dense scan: about three rays per smallest square.
 const MANY_POINTS: usize = 1 << 14;
 
-/// With fewer points, rays share too few voxels.
+/// Minimum number of points for several passes. With fewer points, rays share too few voxels.
 const MIN_POINTS: usize = 2048;
 
 /// Points of a scan whose rays are traced together.

@@ -10,7 +10,7 @@ use rustc_hash::FxHashMap;
 #[derive(Clone, Debug, Default)]
 pub(crate) struct CountedPage {
     low: SparsePage<Bytes>,
-    /// By index of the brick; absent while all are 0.
+    /// Upper bytes of the counts, by index of the brick. A brick is absent while all of its upper bytes are 0.
     high: FxHashMap<usize, Box<Bytes>>,
 }
 
@@ -106,7 +106,7 @@ fn place_in_brick(place: u32) -> usize {
 }
 
 impl Footprint for CountedPage {
-    /// The part of the Morton position that the indices along the slab determine.
+    /// Part of the voxel's Morton position that is determined by its indices along `B` and `C`.
     type Cell = u32;
 
     fn heap_bytes(&self) -> usize {

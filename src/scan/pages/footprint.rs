@@ -30,8 +30,8 @@ pub(crate) trait Footprint: Default {
     /// Records a ray that enters a slab through one voxel and leaves it through another or the same one.
     fn pass_through<const A: usize>(&mut self, slab: u32, entry: Self::Cell, exit: Self::Cell);
 
-    /// Records a ray that passes a stretch of slabs from slab `a` on. Returns the number of slabs that could be
-    /// decided.
+    /// Records a ray that passes a stretch of slabs from slab `a` on. Returns the number of slabs that are complete.
+    /// The stretch ends early at a slab whose voxels are uncertain because of rounding.
     #[inline]
     fn pass_stretch<const A: usize, const B: usize, const C: usize>(
         &mut self,

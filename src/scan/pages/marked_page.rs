@@ -8,7 +8,7 @@ use crate::space::{BRICK_VOXELS, BrickMask, VoxelIndex, places};
 #[derive(Clone, Debug, Default)]
 pub(crate) struct MarkedPage {
     passed: Marks,
-    /// Few bricks have hits: those close to ground and walls.
+    /// Hits; absent if there are none. Few bricks have hits: those close to ground and walls.
     hits: Option<Box<SparsePage<BrickMask>>>,
     /// Bricks with marks, by position; set by [`MarkedPage::find_bricks`], after which no mark is added.
     found: Option<BrickMask>,
@@ -73,7 +73,8 @@ impl Words {
     }
 }
 
-/// Bit masks, within a word, of a column along z from its first, second, third and fourth voxel on, and the empty mask.
+/// Masks for a column of four voxels along z, which one word contains. `FROM[k]` contains the voxels from number `k`
+/// on; the last mask is empty.
 const FROM: [u64; 5] =
     [1 | 1 << 4 | 1 << 32 | 1 << 36, 1 << 4 | 1 << 32 | 1 << 36, 1 << 32 | 1 << 36, 1 << 36, 0];
 
@@ -159,7 +160,7 @@ fn place_of([x, y, z]: Local) -> u32 {
     part_of_place(0, x) | part_of_place(1, y) | part_of_place(2, z)
 }
 
-// Outlined, because it is used only if memory is short, and every instruction of the inner loop counts.
+// Not inlined, because it is used only if memory is short, and every instruction of the inner loop counts.
 #[cold]
 #[inline(never)]
 fn mark_small(bricks: &mut SparsePage<BrickMask>, place: u32) {
@@ -285,7 +286,7 @@ impl MarkedPage {
 }
 
 impl Footprint for MarkedPage {
-    /// The part of the Morton position that the indices along the slab determine.
+    /// Part of the voxel's Morton position that is determined by its indices along `B` and `C`.
     type Cell = u32;
 
     fn heap_bytes(&self) -> usize {
@@ -339,7 +340,7 @@ impl Footprint for MarkedPage {
 }
 
 impl Footprint for SparsePage<BrickMask> {
-    /// The part of the Morton position that the indices along the slab determine.
+    /// Part of the voxel's Morton position that is determined by its indices along `B` and `C`.
     type Cell = u32;
 
     fn heap_bytes(&self) -> usize {

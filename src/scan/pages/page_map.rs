@@ -32,8 +32,8 @@ impl<F: Footprint> PageMap<F> {
         self.directory.clear();
         self.directory.resize(window.pages().map(|pages| pages as usize).iter().product(), 0);
         self.far.clear();
-        // At most as many as the last scan had, so that a scan with distant stray rays does not occupy memory
-        // permanently; and at most `max_fast`, because only fast pages are kept.
+        // Keep at most as many pages as the last scan had, so that a scan with distant stray rays does not occupy
+        // memory permanently. Only fast pages are kept, so at most `max_fast`.
         self.spare.clear();
         self.spare.extend(self.pages.drain(..).take(max_fast).filter_map(F::cleared));
         self.indices.clear();

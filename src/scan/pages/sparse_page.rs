@@ -3,7 +3,7 @@ use crate::space::{BRICK_EDGE, BRICK_VOXELS, MortonCode, VoxelIndex, VoxelKey, p
 
 /// Page in which only bricks that rays write to take memory.
 ///
-/// A ray crosses from brick to brick without border tests.
+/// A voxel is found by its Morton position in the page, so a ray crosses from brick to brick without border tests.
 #[derive(Clone, Debug)]
 pub(crate) struct SparsePage<B> {
     /// Number of each brick, in Morton order, from 1; 0 if it is absent.
@@ -25,7 +25,7 @@ pub(crate) fn part_of_place(axis: usize, index: u32) -> u32 {
     PARTS[axis][index as usize % PAGE_EDGE as usize]
 }
 
-/// By axis, so that a part is one look-up without a shift.
+/// Values of [`part_of_place`], by axis and index. A table per axis makes it one look-up without a shift.
 static PARTS: [[u32; PAGE_EDGE as usize]; 3] = parts();
 
 const fn parts() -> [[u32; PAGE_EDGE as usize]; 3] {

@@ -3,9 +3,9 @@ use crate::space::{Point, VoxelIndex};
 /// Voxels along the edge of a page of 8 x 8 x 8 bricks.
 pub(crate) const PAGE_EDGE: i64 = 64;
 
-/// Candidate reaches of a window in voxels, to both sides of the sensor along each axis. The largest is chosen with
-/// which the window has at most [`MAX_PAGES`], otherwise the smallest. A stray ray high up makes the window narrower,
-/// which only costs time.
+/// Possible reaches of a window in voxels, to both sides of the sensor along each axis. A window has the largest reach
+/// with which it has at most [`MAX_PAGES`], or the smallest reach if none fits. A stray ray that points up can reduce
+/// the reach, which only costs time.
 const REACHES: [i64; 3] = [8128, 4032, 1984];
 
 /// Number of pages of a window with the smallest reach to all sides: 1 MiB of page numbers.

@@ -14,7 +14,7 @@ use crate::space::{BRICK_VOXELS, BrickMask, Grid, TileIndex, VoxelIndex, is_in_m
 use rayon::prelude::*;
 use rustc_hash::FxHashMap;
 
-/// Collector of the updates of consecutive rays if each ray updates the voxels it crosses.
+/// Collector of the updates of consecutive rays in insertion per ray: each ray updates all voxels that it crosses.
 ///
 /// The updates of a voxel are stored as runs: a number of misses, then a hit. This preserves their order; the order
 /// between voxels is irrelevant.
@@ -173,7 +173,7 @@ impl PerRayCollector {
         (1..ends.len()).for_each(|k| ends[k] += ends[k - 1]);
         let mut runs = vec![NO_RUN; self.ended.len()];
         for run in &self.ended {
-            // Advances from the start of the brick's runs to their end.
+            // `ends` contains the start of each brick's runs at first, and their end after this loop.
             let next = &mut ends[brick_of(run)];
             runs[*next as usize] = run.run();
             *next += 1;
@@ -280,8 +280,8 @@ fn kept<T: Copy>(values: &mut [T], is_kept: impl Fn(&T) -> bool) -> usize {
     count
 }
 
-/// Maximum number of tiles, if tiles are smaller than bricks, whose updates are in memory at a time before they are
-/// moved to parts.
+/// Approximate maximum number of tiles whose updates are in memory at a time before they are moved to parts. Used for
+/// small tiles, of which several share a brick.
 const TILES_AT_A_TIME: usize = 4096;
 
 /// Moves the updates of several collectors to `parts`; the collectors are in the order of their rays.

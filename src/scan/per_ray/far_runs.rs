@@ -2,7 +2,7 @@ use crate::scan::PackedUpdates;
 use crate::scan::updates::{BrickRuns, Run, TileRuns, TileUpdates, brick_code};
 use crate::space::{BRICK_EDGE, Grid, TileIndex, VoxelIndex, place_of_voxel};
 
-/// Updates of consecutive rays outside the window if each ray counts: packed, tile by tile as each ray reaches them.
+/// Updates outside the window in insertion per ray. The updates of each ray in each tile are packed separately.
 #[derive(Clone, Debug)]
 pub(crate) struct FarRuns {
     grid: Grid,
@@ -46,13 +46,13 @@ impl FarRuns {
     pub(crate) fn hit(&mut self, voxel: VoxelIndex, intensity: f32) {
         self.push(voxel, Run { place: place_of_voxel(voxel) as u16, misses: 0, hit: Some(intensity) });
         self.hits += 1;
-        // The next ray may cross the same voxels again.
+        // Packed separately from those of the next ray, which may cross the same voxels again.
         self.end_tile();
     }
 
     fn push(&mut self, voxel: VoxelIndex, run: Run) {
         let tile = self.grid.tile_of_voxel(voxel);
-        // Clipped rays may all be in one tile.
+        // A limit on pending updates is needed, because clipped rays may all be in one tile.
         if self.tile != Some(tile) || self.pending == MAX_PENDING {
             self.end_tile();
             self.tile = Some(tile);
@@ -68,7 +68,7 @@ impl FarRuns {
     fn end_tile(&mut self) {
         let Some(tile) = self.tile.take() else { return };
         self.pending = 0;
-        // Stable: the runs of a voxel remain in order.
+        // The sort is stable, so that the runs of a voxel remain in order.
         self.bricks.sort_by_key(|brick| brick_code(brick.index));
         let mut all = TileRuns::default();
         for BrickOfRay { index, mut runs } in self.bricks.drain(..) {

@@ -17,7 +17,7 @@ pub(crate) struct OrderedCollector<'a> {
     misses: u64,
 }
 
-/// Bytes of an update in a list that may be half empty; more with an intensity.
+/// Maximum bytes of an update: four for the voxel and four for the intensity, in lists that may be half empty.
 const BYTES_PER_UPDATE: usize = 16;
 /// Bytes of a tile in addition to its updates.
 const BYTES_PER_TILE: usize = 256;
@@ -31,7 +31,8 @@ impl<'a> OrderedCollector<'a> {
     pub(crate) fn push(&mut self, voxel: VoxelIndex, observation: Observation) {
         let offset_in =
             |tile: &VoxelBox| -> VoxelIndex { std::array::from_fn(|k| voxel[k].wrapping_sub(tile.min[k])) };
-        // Tiles at the limits of the index range are clipped.
+        // Boxes of tiles are clipped to the index range, so this test is also exact for tiles at the limits of the
+        // range.
         let in_latest = |(_, tile, _): &&mut (_, VoxelBox, _)| tile.contains(voxel);
         if let Some((_, tile, updates)) = self.lists.get_mut(self.latest).filter(in_latest) {
             updates.push(offset_in(tile), observation, self.keep_intensities);

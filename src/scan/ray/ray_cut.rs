@@ -55,7 +55,7 @@ impl<'a> RayCut<'a> {
     /// Returns the clipped ray to `end`; `None` if it crosses no selected tile.
     #[inline]
     pub(crate) fn apply(&self, origin: &RayOrigin, end: RayEnd) -> Option<RayEnd> {
-        // In most scans most rays are close to the sensor: a cheap test rejects those of other regions.
+        // Most rays end close to the sensor: a cheap test rejects those that do not reach the selected tiles.
         if (0..3).any(|k| end.point[k] < self.ends.0[k] || end.point[k] > self.ends.1[k]) {
             return None;
         }
@@ -80,7 +80,7 @@ impl<'a> RayCut<'a> {
         let voxel = |local: Local, k: usize| base[k] + local[k] as i32;
         let wanted = VoxelBox {
             min: std::array::from_fn(|k| voxel(low, k)),
-            // A window ends before the last voxel of the index range.
+            // Adding 1 cannot overflow: a window ends before the last voxel of the index range.
             end: std::array::from_fn(|k| voxel(high, k) + 1),
         };
         let wanted = wanted.intersection(&self.voxels);
@@ -110,8 +110,8 @@ impl<'a> RayCut<'a> {
         for k in 0..3 {
             let inverse = 1.0 / ray.direction[k];
             let (first, second) = (low[k] * inverse, high[k] * inverse);
-            // NaN, from a ray along a border of the box, is ignored: the border is a margin away from the selected
-            // tiles.
+            // A ray along a border of the box gives NaN, which `max` and `min` ignore. This is correct, because the
+            // selected tiles are at a distance of a margin from the border.
             enter = enter.max(first.min(second));
             leave = leave.min(first.max(second));
         }
@@ -156,7 +156,7 @@ impl<'a> RayCut<'a> {
             }
             from = until;
         }
-        // After the ray's last slab nothing is clipped.
+        // If the last slab of the ray is included, the end of the span is kept: nothing is clipped after it.
         found.map(|found| if found.until == end { SlabSpan { until: span.until, ..found } } else { found })
     }
 

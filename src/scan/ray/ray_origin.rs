@@ -8,7 +8,7 @@ pub(crate) struct RayOrigin {
     pub(crate) voxel: VoxelIndex,
     /// Whether the point is on a border between voxels: rays toward lower indices leave its voxel immediately.
     pub(crate) is_on_border: bool,
-    /// The same for each axis.
+    /// Whether the point is on a border between voxels, for each axis.
     pub(crate) is_on_border_along: [bool; 3],
 }
 

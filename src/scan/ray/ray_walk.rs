@@ -162,8 +162,8 @@ impl RayWalk {
         let [mut x, mut y, mut z] = self.voxel;
         let [mut tx, mut ty, mut tz] = self.next;
         let mut entry = self.entry;
-        // First coordinate outside per axis; along an axis that the walk never leaves, a coordinate that it never
-        // reaches.
+        // For each axis, the first coordinate outside of the region in the walk's direction. Along an axis without
+        // steps, a coordinate that the walk never reaches.
         let [ex, ey, ez]: VoxelIndex = std::array::from_fn(|k| match self.step[k] {
             1 => region.end[k],
             -1 => region.min[k].wrapping_sub(1),
@@ -276,7 +276,7 @@ impl RayWalk {
             true => region.end[axis] - 1,
             false => self.voxel_before(axis, self.last[axis], time, axis < entry_axis),
         });
-        // Along another axis the ray may have left the region's range by then.
+        // When the ray enters the range along the last axis, it may already have left the range along another one.
         if !region.contains(voxel) {
             return false;
         }

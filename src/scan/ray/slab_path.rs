@@ -14,7 +14,7 @@ const NEAR_BORDER: u32 = 1 << 14;
 /// the error of a position is below 2^14 units.
 const NEAR_EDGE: u64 = 1 << 16;
 
-/// [`NEAR_BORDER`] within a page: positions there have six bits less, and an additional error of one unit for each of
+/// [`NEAR_BORDER`] within a page: positions there have six fewer bits, and an additional error of one unit for each of
 /// the page's 64 slabs.
 const NEAR_BORDER_IN_PAGE: u64 = 1 << 14;
 
@@ -71,8 +71,8 @@ impl SlabPath {
         ((self.at_b >> 32) as u32, (self.at_c >> 32) as u32)
     }
 
-    /// Returns the slabs after `done` of `slabs` that the ray passes in the page of `[a, b, c]`, the voxel through
-    /// which it enters the first; the ray ends in the voxel `last`.
+    /// Returns the next slabs, after the first `done` of `slabs`, up to the border of the page. The ray enters the
+    /// first of them through the voxel `[a, b, c]` and ends in the voxel `last`.
     #[inline]
     pub(crate) fn stretch(&self, [a, b, c]: [u32; 3], last: [u32; 3], done: u32, slabs: u32) -> Stretch {
         let first = self.after(done);
@@ -81,7 +81,7 @@ impl SlabPath {
             true => (slabs - done, false),
             false => first.slabs_in_page([a, b, c], slabs - done),
         };
-        // As many integer bits as an index within the page has.
+        // Positions get as many integer bits as an index within the page has.
         let shift = EDGE.trailing_zeros();
         let local = |at: i64| (at >> shift) as u32;
         Stretch {
@@ -94,8 +94,8 @@ impl SlabPath {
         }
     }
 
-    /// Returns how many of `slabs` slabs from here on the ray passes in the page of `[a, b, c]`, and whether it leaves
-    /// the page within the next one.
+    /// Returns how many of the next `slabs` slabs the ray certainly passes in the page of the voxel `[a, b, c]`, and
+    /// whether it leaves the page within the slab after them.
     fn slabs_in_page(&self, [a, b, c]: [u32; 3], slabs: u32) -> (u32, bool) {
         let to_end = if self.is_up { EDGE - (a & (EDGE - 1)) } else { (a & (EDGE - 1)) + 1 };
         let most = to_end.min(slabs);
@@ -108,7 +108,7 @@ impl SlabPath {
                 return 0;
             }
             let left_voxels = left as f64 * (1.0 / (1_u64 << 32) as f64);
-            // Slightly reduced, so that rounding does not add one too many.
+            // The quotient is slightly reduced, so that rounding never adds a crossing.
             ((left_voxels / slope.abs() * (1.0 - 1e-6)) as u32).saturating_add(1)
         };
         let sideways = crossings(self.at_b, self.slopes[0], b).min(crossings(self.at_c, self.slopes[1], c));
@@ -155,7 +155,8 @@ pub(crate) struct Stretch {
 }
 
 impl Stretch {
-    /// Passes the voxels. Returns the number of slabs that could be decided.
+    /// Passes the voxels. Returns the number of slabs that are complete. If there are more slabs, the voxels of the
+    /// next one are uncertain.
     #[inline]
     pub(crate) fn pass<const A: usize, const B: usize, const C: usize, F: Footprint>(
         &self,
@@ -163,7 +164,7 @@ impl Stretch {
         mut a: u32,
     ) -> u32 {
         let bits = EDGE.trailing_zeros();
-        // For both halves, the bits of the fraction that show whether it is close to a border.
+        // For both halves: bits of the fraction that are all 0 close to a border, after `near_border` is added.
         let near = NEAR_BORDER_IN_PAGE >> bits;
         let fraction = ((1_u64 << (32 - bits)) - 1) & !(2 * near - 1);
         let near_border = near << 32 | near;
@@ -209,7 +210,7 @@ impl Stretch {
         const BITS: u32 = EDGE.trailing_zeros();
         const NEAR: u64 = NEAR_BORDER_IN_PAGE >> BITS;
         const RAISED: u64 = NEAR << 32 | NEAR;
-        // All these bits are 0 in a raised position close to a border.
+        // In a position close to a border, all these bits are 0 after `RAISED` is added.
         const FRACTION: u64 = ((1_u64 << (32 - BITS)) - 1) & !(2 * NEAR - 1);
         let b_of = |at: u64| (at >> (64 - BITS)) as u32;
         let c_of = |at: u64| (at as u32) >> (32 - BITS);
@@ -221,7 +222,7 @@ impl Stretch {
         let mut before = u64::from(self.entry.0) << (64 - BITS) | u64::from(self.entry.1) << (32 - BITS);
         let mut at = self.at.wrapping_add(RAISED);
         mark(part_of_place(A, a) | cell(before), 1);
-        // For the lowest slab of the word.
+        // Part of the Morton position for the lowest slab in the word.
         let mut part = part_of_place(A, a & !3);
         for done in 0..=last {
             if at & (FRACTION << 32) == 0 || at & FRACTION == 0 {
@@ -257,8 +258,8 @@ impl Stretch {
     }
 }
 
-/// For rays down and up, for each axis and each of the four slabs of a word: the bits of the slab and of the next, if
-/// that is also in the word.
+/// Bit of a slab in a word and, if it is in the same word, of the next slab. Indexed by whether the ray ascends, by the
+/// axis `A`, and by the slab (0 to 3).
 static PAIRS: [[[u64; 4]; 3]; 2] = pairs();
 
 const fn pairs() -> [[[u64; 4]; 3]; 2] {

@@ -22,8 +22,8 @@ pub(crate) struct SlabRay<'a> {
     pub(crate) span: SlabSpan,
 }
 
-/// Maximum number of slabs of a ray that are walked one at a time by the closed form; after that, it walks the rest of
-/// the ray.
+/// Maximum number of slabs of a ray that the exact walk handles one at a time. After that, it handles the rest of the
+/// ray.
 const MAX_WALKED: u32 = 4;
 
 impl<'a> SlabRay<'a> {
@@ -45,7 +45,7 @@ impl<'a> SlabRay<'a> {
     #[inline]
     pub(crate) fn slabs(&self) -> u32 {
         let [x, y, z]: [u32; 3] = std::array::from_fn(|k| self.last[k].abs_diff(self.origin.voxel[k]));
-        // Not by index, which would access memory.
+        // A match keeps the values in registers; an index would access memory.
         match self.axis {
             0 => x,
             1 => y,
@@ -98,7 +98,7 @@ impl<'a> SlabRay<'a> {
         walk.for_each_of_next(steps, visit);
     }
 
-    /// Box of all voxels in the slabs from that of the origin up to, but excluding, this one.
+    /// Box of all voxels in the slabs from the origin's slab up to, but excluding, slab `until`.
     fn first_slabs(&self, until: u32) -> VoxelBox {
         let (mut min, mut end) = ([i32::MIN; 3], [i32::MAX; 3]);
         let at = self.origin.voxel[self.axis];
@@ -174,7 +174,7 @@ impl<'a> SlabRay<'a> {
             let local = voxel::<A, B, C>(a, b, c);
             Err(std::array::from_fn(|k| base[k] + local[k] as i32))
         };
-        // Leaving a border may have counted as a slab.
+        // `leave_borders` may have moved the start by one slab.
         let left = a.abs_diff((self.origin.voxel[A] - base[A]) as u32);
         let until = self.span.until.saturating_sub(left);
         let all_slabs = last[A].abs_diff(a);
@@ -186,7 +186,7 @@ impl<'a> SlabRay<'a> {
             if done > 0 {
                 let crossing = path.after(done - 1);
                 if crossing.is_near_border() {
-                    // No voxel may be omitted.
+                    // The voxel after the skipped slabs is uncertain: skip none, so that no voxel is omitted.
                     done = 0;
                 } else {
                     (b, c) = crossing.voxel();

@@ -4,8 +4,8 @@ use std::io;
 /// Callback that creates the file to which a [`PartLog`] spills.
 pub(crate) type MakeScratch<'a> = dyn Fn() -> io::Result<Box<dyn Scratch>> + Sync + 'a;
 
-/// Append-only log of records. Its tail is in memory, the rest in a file if the log is too large. Each record links to
-/// the previous record of its list, so a list is identified by its last record.
+/// Append-only log of records. Its tail is in memory. If the log is too large, the rest is in a file. Each record links
+/// to the previous record of its list, so a list is identified by its last record.
 pub(crate) struct PartLog<'a> {
     tail: Vec<u8>,
     max_tail_bytes: usize,

@@ -22,8 +22,8 @@ use std::sync::{Mutex, PoisonError};
 /// parts of a tile are concatenated.
 pub(crate) struct ScanParts<'a> {
     mapped: MappedTiles<'a>,
-    /// Rule for weak misses. Parts then have all marks within its reach of the tile, and the rule is applied to the
-    /// merged parts.
+    /// Rule for weak misses, if the map has one. The rule is applied to the merged parts of a tile, which therefore
+    /// include all marks within its reach of the tile.
     clearance: Option<Clearance>,
     parts: Mutex<Parts<'a>>,
     stop: &'a Stop,

@@ -81,7 +81,8 @@ impl ScanTracer {
             }
             (InsertMode::PerRay, true) if rules.are_rays_in_order() => scan_rays.per_ray_in_order()?,
             (InsertMode::PerRay, true) => scan_rays.per_ray(&mut self.per_ray)?,
-            // Their size is unknown before they are collected, so the caller must trace the scan in parts.
+            // The size of these updates is unknown before they are collected, so the caller must trace the scan in
+            // parts.
             (InsertMode::PerRay, false) => return Ok(None),
         };
         self.stop.check()?;

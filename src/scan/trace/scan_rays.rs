@@ -141,7 +141,8 @@ impl<'a> ScanRays<'a> {
             let mut batch = Vec::with_capacity(BATCH);
             let (mut seen, mut extend_at) = (0, 0);
             self.points.for_each_chunk(range, &mut |points, intensities| {
-                // Each chunk adds less to the prefixes, but extending them takes equally long each time.
+                // Extending the prefixes takes equally long for each chunk, but later chunks add less to them. So they
+                // are extended whenever the number of points has doubled.
                 let extends = seen >= extend_at;
                 if extends {
                     extend_at = 2 * (seen + points.len());
@@ -170,7 +171,7 @@ impl<'a> ScanRays<'a> {
         })
     }
 
-    /// Insertion per ray: its misses from the sensor outward, then its hit, in the order of the points.
+    /// Insertion per ray, in the order of the points: the misses of a ray from the sensor outward, then its hit.
     pub(crate) fn per_ray(&self, collectors: &mut Vec<PerRayCollector>) -> Result<ScanUpdates> {
         let parts = self.threads().max(self.points.len().div_ceil(MAX_RAYS));
         let (collectors, report) = self.collect(collectors, parts, |collector, range| {
@@ -204,7 +205,7 @@ impl<'a> ScanRays<'a> {
                 self.take_rays(collector, range, PerRayCollector::is_full_for, &mut report)?;
                 Ok(report)
             })?;
-            // Rays after a collector that was full are traced again.
+            // If a collector was full, the rays after its last one are traced again in the next round.
             let mut used = 0;
             for (part, of_part) in reports.into_iter().enumerate() {
                 let wanted = part_of(&some, part, threads);
@@ -416,7 +417,7 @@ impl<'a> ScanRays<'a> {
 /// instructions.
 fn bounds_of_finite(points: &[Point]) -> Option<(Point, Point)> {
     let (mut low, mut high) = ([[f64::INFINITY; 3]; 2], [[f64::NEG_INFINITY; 3]; 2]);
-    // Zero while all are finite, then NaN.
+    // Each sum is 0 while all coordinates are finite; otherwise it becomes NaN.
     let mut all = [[0.0; 3]; 2];
     let (pairs, rest) = points.as_chunks::<2>();
     let last = rest.first().map(|&point| [point; 2]);
@@ -431,7 +432,7 @@ fn bounds_of_finite(points: &[Point]) -> Option<(Point, Point)> {
     is_finite.then(|| (smaller(low[0], low[1]), larger(high[0], high[1])))
 }
 
-// Without the library's handling of NaN, each is one instruction.
+// Unlike `f64::min` and `f64::max`, these functions have no special case for NaN, so each is one instruction.
 #[inline]
 fn smaller(a: Point, b: Point) -> Point {
     std::array::from_fn(|axis| if b[axis] < a[axis] { b[axis] } else { a[axis] })

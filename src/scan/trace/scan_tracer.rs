@@ -77,7 +77,7 @@ impl ScanTracer {
     }
 
     /// Like [`ScanTracer::trace`], but in insertion per ray the updates of a tile are in the order of the rays. Octrees
-    /// with a cache need this, because it depends on the order of different voxels.
+    /// with a voxel cache need this, because the content of the cache depends on the order in which voxels are updated.
     ///
     /// # Errors
     ///

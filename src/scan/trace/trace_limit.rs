@@ -21,7 +21,7 @@ pub(crate) struct CollectorLimit {
 const FAST_PAGE_BYTES: usize = 66 << 10;
 /// Bytes of a brick while its marks are converted to updates, which are in three lists.
 const UPDATE_BYTES: usize = 530;
-/// With less memory, a collector would be drained constantly.
+/// Minimum bytes of a collector. With less memory, it would be drained constantly.
 const MIN_COLLECTOR_BYTES: usize = 4 << 20;
 
 impl Default for TraceLimit {

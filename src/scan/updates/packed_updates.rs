@@ -15,7 +15,7 @@ pub struct PackedUpdates {
 const MASKS: u8 = 0;
 const RUNS: u8 = 1;
 const ORDERED: u8 = 2;
-/// As `MASKS`, each brick with its weak misses.
+/// Like `MASKS`, but each brick also has the mask of its weak misses.
 const GUARDED_MASKS: u8 = 3;
 
 impl PackedUpdates {
@@ -72,7 +72,8 @@ impl PackedUpdates {
         packed
     }
 
-    /// Inverse of [`PackedUpdates::as_bytes`]; `updates` is their number. The bytes must come from there.
+    /// Inverse of [`PackedUpdates::as_bytes`]; `updates` is their number. The bytes must be those that `as_bytes`
+    /// returned.
     pub(crate) fn from_parts(bytes: Vec<u8>, updates: usize) -> Self {
         Self { bytes, updates }
     }
@@ -104,7 +105,7 @@ impl PackedUpdates {
         let mut input = Unpacker { input: &*self.bytes };
         std::iter::from_fn(move || {
             let next = input.next().transpose()?;
-            Some(next.expect("what was packed is whole"))
+            Some(next.expect("packed updates are complete"))
         })
     }
 
@@ -184,7 +185,7 @@ impl Packer<'_> {
     }
 }
 
-/// Returns a byte in which bit `k` is the `k`-th flag.
+/// Returns a byte whose bit `k` is flag `k`.
 fn set_of(are_in: [bool; 8]) -> u8 {
     (0..8).fold(0, |set, k| set | u8::from(are_in[k]) << k)
 }

@@ -31,7 +31,7 @@ pub(crate) fn bricks_by_tile(
 /// Lists by tile take this multiple of the memory of the original bricks.
 pub(crate) fn mean_tiles_of_brick(grid: &Grid) -> usize {
     let (tile, brick) = (grid.voxels_per_tile_edge() as usize, BRICK_EDGE as usize);
-    // Bricks begin equally often at all multiples of this within tiles.
+    // Within tiles, bricks begin at multiples of `step`, at each one equally often.
     let step = 1 << tile.trailing_zeros().min(BRICK_EDGE.trailing_zeros());
     let parts_by_tile = (tile + brick - step).pow(3);
     (parts_by_tile as f64 / tile.pow(3) as f64).round() as usize

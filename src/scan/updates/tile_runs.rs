@@ -100,7 +100,7 @@ impl TileRuns {
             return parts.remove(0);
         }
         let mut bricks: Vec<BrickRuns<'_>> = parts.iter().flat_map(Self::bricks).collect();
-        // Stable: runs of earlier parts remain first in a brick.
+        // The sort is stable, so that runs of earlier parts remain first in a brick.
         bricks.sort_by_key(|runs| runs.brick);
         let mut merged = Self::default();
         bricks.into_iter().for_each(|runs| merged.push(runs));

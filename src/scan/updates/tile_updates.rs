@@ -41,7 +41,7 @@ pub struct BrickUpdate {
     pub hits: BrickMask,
     /// Voxels that were passed and not hit.
     pub misses: BrickMask,
-    /// Those of the misses that do not change a known voxel.
+    /// Weak misses, a subset of `misses`: they do not change a known voxel.
     pub weak: BrickMask,
     /// The largest intensity of each hit voxel, in the order of the mask; empty for sensor models that need none.
     pub intensities: Box<[f32]>,

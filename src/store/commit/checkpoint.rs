@@ -14,8 +14,8 @@ use std::path::Path;
 /// Work that a commit leaves: renames tables to their final names and removes the files of removed tiles and deleted
 /// snapshots.
 ///
-/// Until this is done durably, these names must not be reused: after a crash the pending renames and removals are
-/// repeated.
+/// These files must not be written again before this work is durable: recovery after a crash repeats the renames and
+/// removals.
 #[derive(Debug, Default)]
 pub(in crate::store) struct Checkpoint {
     /// Committed versions that still have their `*.next` names.
@@ -30,7 +30,8 @@ pub(in crate::store) struct Checkpoint {
     deleted_snapshot: Option<SnapshotName>,
 }
 
-/// Number of tiles synced at a time. Their paths take several times the memory of the index.
+/// Number of tiles synced at a time. The limit bounds memory: the paths of a tile take several times the memory of its
+/// entry in the index.
 pub(in crate::store) const TILES_SYNCED_AT_ONCE: usize = 4096;
 
 impl Checkpoint {
@@ -96,7 +97,7 @@ impl Checkpoint {
         kept: &mut KeptTables,
     ) -> Result<Vec<TileIndex>> {
         let (layout, flush_number) = (files.layout(), flush_number.saturating_sub(1));
-        // After the commit: readers that open the map later see the new tables.
+        // Refresh after the commit: a reader that opens the map from now on uses the new tables.
         if !tiles.is_empty() {
             kept.refresh_readers();
         }
@@ -106,7 +107,7 @@ impl Checkpoint {
                 files.rename(&layout.current(tile, TileFile::Table), &layout.kept(tile, flush_number))?;
                 kept.keep(tile, flush_number);
             }
-            // Includes names that an earlier attempt, or a killed writer, renamed but could not sync.
+            // Includes tables that an earlier attempt or a killed writer renamed, but did not sync.
             if kept.is_pinned(tile, flush_number) {
                 pinned.push(tile);
             }
@@ -114,12 +115,12 @@ impl Checkpoint {
         Ok(pinned)
     }
 
-    /// Returns whether the current table is the version before the last commit. If an earlier attempt has kept it
-    /// already, the table is missing and the rename has no effect.
+    /// Returns whether the current table is the version before the last commit. If an earlier attempt has already
+    /// renamed it to its kept name, there is no current table, and the caller's rename has no effect.
     fn is_replaced_in_place(&self, files: &MapFiles, tile: TileIndex) -> Result<bool> {
         let is_there = |path: &Path| Ok(files.kind(path)?.is_some());
         match self.unrenamed.contains(tile) {
-            // If there is no next table, it has been renamed already.
+            // If there is no `*.next` table, an earlier attempt has renamed it already.
             true => is_there(&files.layout().next(tile, TileFile::Table)),
             false => is_there(&files.layout().tile_folder(tile)),
         }
@@ -160,8 +161,8 @@ impl Checkpoint {
         }
     }
 
-    /// Removes the files of removed tiles, and their folders if these are empty. The log names the tiles until the
-    /// removal is durable.
+    /// Removes the files of removed tiles, and their folders if these are empty. Until this is durable, the log lists
+    /// the tiles, so that recovery repeats the removal.
     fn finish_removals(&mut self, files: &MapFiles, versions: &mut TileVersions) -> Result<()> {
         if self.unremoved.is_empty() {
             return Ok(());
@@ -193,7 +194,8 @@ impl Checkpoint {
     }
 }
 
-/// Syncs the folders of some tiles, and calls `is_durable` for each.
+/// Syncs the folders of some tiles, and calls `is_durable` for each tile whose folder was synced, up to the first
+/// error.
 pub(in crate::store) fn sync_folders(
     files: &MapFiles,
     tiles: &[TileIndex],

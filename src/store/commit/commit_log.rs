@@ -12,10 +12,11 @@ use std::path::Path;
 /// record            payload length u32, its complement u32, payload, CRC-32 of the payload
 /// payload           kind u32 (bit 0: whole map, else a change; bit 1: tiles were removed; bit 2: names a
 ///                   catalog), tile count u32,
-///                   flush number u64, scan number u64, a tile: index 3 x i32, version 48 bytes;
-///                   where tiles were removed, their count u32 and the index of each, 3 x i32;
-///                   where the map keeps its scans, generation u64, bytes u64 and CRC-32 of its catalog;
-///                   then, where it changed, the text of metadata.json
+///                   flush number u64, scan number u64;
+///                   for each tile: index 3 x i32, version 48 bytes;
+///                   if tiles were removed: their count u32 and the index of each, 3 x i32;
+///                   if the map keeps its scans: generation u64, length u64 and CRC-32 of its catalog;
+///                   if it changed: the text of metadata.json
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct CommitLog {
@@ -39,12 +40,13 @@ impl CommitLog {
         self.bytes
     }
 
-    /// The map that the log belongs to.
+    /// Id of the map that the log belongs to.
     pub fn map_id(&self) -> [u8; 16] {
         self.map_id
     }
 
-    /// Writes and syncs a log with one record of the whole map. `path` is new or a temporary name.
+    /// Writes and syncs a log with one record of the whole map. An existing file at `path` is overwritten, so it must
+    /// not be the log in use.
     pub fn write_whole(
         disk: &dyn Disk,
         path: &Path,
@@ -178,7 +180,7 @@ mod tests {
         TileVersion { scan_number: number, table: file, octree: file, voxels: number, occupied: number / 2 }
     }
 
-    /// The records exceed the sizes of read and write buffers.
+    /// The records are larger than the read and write buffers.
     #[test]
     fn truncated_logs_end_with_a_complete_record_and_wrong_bytes_are_found() {
         let folder = tempfile::tempdir().unwrap();

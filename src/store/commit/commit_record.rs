@@ -18,7 +18,7 @@ pub struct Flush<'a> {
     pub changed: &'a TileTable<TileVersion>,
     /// Tiles that the flush removes from the map.
     pub removed: &'a [TileIndex],
-    /// Catalog of kept scans; `None` if the map keeps none.
+    /// Catalog of kept scans; `None` if the map does not keep its scans.
     pub catalog: Option<CatalogVersion>,
     /// Text of `metadata.json`, if more changed than the fields that every flush changes.
     pub metadata_text: Option<&'a str>,
@@ -46,7 +46,7 @@ pub(in crate::store) enum Next {
     Torn(FormatError),
 }
 
-/// Bytes before and after the payload.
+/// Length of the fields before the payload: its length and the complement.
 pub(in crate::store) const LENGTHS_BYTES: u64 = 8;
 const CRC_BYTES: u64 = 4;
 const PAYLOAD_HEADER_BYTES: usize = 24;
@@ -56,7 +56,7 @@ const TILE_BYTES: usize = INDEX_BYTES + TileVersion::BYTES;
 const WHOLE_MAP: u32 = 1;
 const NAMES_REMOVED: u32 = 2;
 const NAMES_CATALOG: u32 = 4;
-/// Bytes written to the file at a time. Records of large maps exceed what should be buffered.
+/// Bytes written to the file at a time. Records of large maps are too long to buffer as a whole.
 const CHUNK_BYTES: usize = 1 << 16;
 
 /// Approximate length of a record of a whole map of `tiles` tiles.
@@ -76,7 +76,8 @@ impl<'a> Flush<'a> {
         }
     }
 
-    /// Writes `front` and then the record. Returns the length of the record in bytes.
+    /// Writes `front` (the header of a new log, else empty) and then the record. Returns the length of the record in
+    /// bytes.
     pub(in crate::store) fn write(
         &self,
         is_whole_map: bool,
@@ -181,7 +182,7 @@ impl Next {
             return Ok(Self::Record(Box::new(record?), record_bytes));
         }
         let error = wrong("the record does not match its checksum");
-        // A crash damages only the last record. Its length can be on the disk without its content.
+        // Only the last record can be incomplete after a crash: its length may be on the disk without its content.
         if remaining == record_bytes { Ok(Self::Torn(error)) } else { Err(error.into()) }
     }
 }
@@ -262,7 +263,7 @@ impl<R: Read> Payload<R> {
         Ok(bytes)
     }
 
-    /// Reads the rest as metadata.
+    /// Reads the rest of the payload as metadata; `None` if nothing is left.
     fn metadata(&mut self) -> Result<Option<Metadata>, DecodeError> {
         let mut text = String::new();
         let at = self.at;
@@ -290,7 +291,7 @@ impl<R: Read> Payload<R> {
         Ok(self.input.finish())
     }
 
-    /// Returns an error with the offset of the data that begins `bytes_before` bytes earlier.
+    /// Returns an error at the offset `bytes_before` bytes before the current one.
     fn wrong(&self, bytes_before: u64, reason: &str) -> DecodeError {
         FormatError::at_offset(self.at - bytes_before, reason).into()
     }

@@ -17,12 +17,12 @@ pub struct Commits {
     pub last_changed: TileTable<()>,
     /// Tiles that the last record removes. Their files may still exist.
     pub last_removed: Vec<TileIndex>,
-    /// Catalog of kept scans; `None` if the map keeps none, or if an older version wrote the log: the newest catalog is
-    /// valid then.
+    /// Catalog of kept scans. `None` if the map does not keep its scans, or if an older version of voxtile wrote the
+    /// log: then the newest catalog is valid.
     pub catalog: Option<CatalogVersion>,
     /// Last metadata in the log. Its parameters are those of the map; its bounds and numbers may be older.
     pub metadata: Option<Metadata>,
-    /// Error at the end of the log, where a flush may have been interrupted. That flush was not committed, unless
-    /// `metadata.json` names it.
+    /// Error at the end of the log, where a flush may have been interrupted. That flush was not committed, except if
+    /// its number is in `metadata.json`: then the log is damaged.
     pub torn: Option<FormatError>,
 }

@@ -16,7 +16,8 @@ use crate::store::tiles::tile_versions::TileVersions;
 pub(in crate::store) struct Committer {
     /// `None` only for a map of the original format.
     log: Option<CommitLog>,
-    /// Whether the log ends with its last commit. It may not after a failed append.
+    /// Whether the log ends with its last commit; false after a failed append, which may have written a part of a
+    /// record.
     is_log_settled: bool,
     metadata: Metadata,
     /// Flush number in the `metadata.json` on disk; `None` in the original format. After a crash it may be older than
@@ -26,7 +27,7 @@ pub(in crate::store) struct Committer {
     listed: Option<SnapshotList>,
     /// Whether the log contains the list of snapshots.
     is_list_logged: bool,
-    /// Held while the store may write.
+    /// Writer lock; `None` if the map is open for reading only.
     lock: Option<WriterLock>,
 }
 
@@ -203,7 +204,8 @@ impl Committer {
         })?;
         self.log = Some(compacted);
         self.is_list_logged = true;
-        // Later records are only in this file. Every commit syncs the folder first.
+        // Later records are only in the new file, so its name must be durable. If this sync fails, the next commit
+        // repeats it.
         files.sync_map_folder()
     }
 
@@ -229,7 +231,7 @@ impl Committer {
         let (disk, text) = (&**files.disk(), self.metadata.to_text());
         let watch = map_folder::replace(disk, &files.layout().metadata(), |next| {
             map_folder::write_text(disk, next, &text)?;
-            // Before the file is visible, so that no reader is missed.
+            // Watch the file before it is visible, so that no reader is missed.
             disk.watch(next)
         })?;
         self.written_flush = Some(flush_number);

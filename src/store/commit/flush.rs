@@ -19,7 +19,7 @@ impl TileStore {
     ///
     /// # Errors
     ///
-    /// An I/O error. The earlier next version is lost then.
+    /// An I/O error. A next version of the file that was written before is lost then.
     pub fn write_next(
         &mut self,
         tile: TileIndex,
@@ -35,7 +35,7 @@ impl TileStore {
     ///
     /// An I/O error while finishing the last commit.
     pub fn writer(&mut self) -> Result<TileWriter> {
-        // A committed version may still have the name that will be written.
+        // A committed version may still have the `*.next` name of the new one.
         self.finish_earlier_work()?;
         let map_id = self.committer.logged_map_id()?;
         Ok(TileWriter::new(self.files.clone(), map_id))
@@ -63,8 +63,8 @@ impl TileStore {
         }
     }
 
-    /// Truncates the list of scans to its valid, committed part. Returns the path of the original file if it was
-    /// damaged.
+    /// Truncates the list of scans to its valid, committed part. If the list was damaged, returns the path of a copy of
+    /// the original.
     ///
     /// # Errors
     ///
@@ -185,14 +185,14 @@ impl TileStore {
         if let Some(ext) = &mut metadata.ext {
             (ext.scan_records, ext.catalog) = (Some(scans.records), catalog);
         }
-        // As late as possible, so that the commit of another writer is not truncated.
+        // Checked as late as possible: if another writer has taken over, an append would truncate its commit.
         self.committer.check_lock()?;
         let text = metadata.to_text();
         let metadata_text = is_new.then_some(&*text);
         let (changed, scan_number) = (self.versions.next(), begun.scan_number);
         let flush = Flush { number, scan_number, changed, removed: &removed, catalog, metadata_text };
         if let Err(error) = self.committer.append(&self.files, &flush, &metadata) {
-            // Immediately, if possible: another process would see a record that is not durable.
+            // Remove the record at once, if possible: another process could see a flush that is not durable.
             let _ = self.finish_earlier_work();
             self.archive.not_committed();
             return Err(error);
@@ -220,8 +220,8 @@ impl TileStore {
         }
     }
 
-    /// Begins to rename some of the committed versions; `None` if there are none left. [`TileStore::put_in_place`]
-    /// follows.
+    /// Selects some of the committed versions to rename, and returns them as a step; `None` if all are renamed. Then
+    /// [`TileStore::put_in_place`] renames them one by one.
     ///
     /// # Errors
     ///
@@ -240,7 +240,7 @@ impl TileStore {
     }
 
     /// Renames the version of one tile of a step, once [`Step::sync_kept`] has succeeded. A rename can take
-    /// milliseconds on a busy disk, so a shared store should be released between tiles.
+    /// milliseconds on a busy disk, so release a shared store between tiles.
     ///
     /// # Errors
     ///
@@ -269,7 +269,7 @@ impl TileStore {
         }
     }
 
-    /// Finishes the last commit without a new one.
+    /// Finishes the pending work of the last commit, without a new commit.
     ///
     /// # Errors
     ///
@@ -293,7 +293,7 @@ impl TileStore {
     /// Does the steps after the commit record: `metadata.json`, renames, removals, log compaction. After an I/O error
     /// the next call resumes.
     pub(in crate::store) fn finish_commit(&mut self) -> Result<()> {
-        // First, because the writer cannot detect which flush is read by readers that open the map before this.
+        // Replace `metadata.json` first: until then, the writer cannot know which flush a new reader uses.
         if self.committer.written_flush() != Some(self.commits().flush_number) {
             self.write_metadata()?;
         }
@@ -302,7 +302,7 @@ impl TileStore {
         self.committer.compact_log(&self.files, self.versions.commits())
     }
 
-    /// Renames the next version of a tile's octree alone. It must be the octree that the log names.
+    /// Renames the next version of a tile's octree, without its table. It must be the octree that the log names.
     ///
     /// # Errors
     ///
@@ -347,8 +347,8 @@ impl TileStore {
         self.committer.logged_map_id()
     }
 
-    /// Keeps tables for readers that may have opened the last commit although `metadata.json` could not be replaced
-    /// after it.
+    /// Keeps the tables of the last commit if `metadata.json` could not be replaced after it: readers may have opened
+    /// this commit undetected.
     pub(in crate::store) fn keep_for_late_readers(&mut self) {
         if self.is_metadata_behind() {
             let flush_number = self.commits().flush_number;
@@ -417,7 +417,7 @@ impl Unsynced {
         Synced { failed, has_lost_scans: false, result }
     }
 
-    /// Like [`Unsynced::sync`], but first syncs kept scans, of which the commit then has little left to sync.
+    /// Like [`Unsynced::sync`], but syncs the kept scans first, so that the commit itself has little left to sync.
     pub fn sync_with_scans(&self) -> Synced {
         for &segment in &self.segments {
             let path = self.files.layout().segment(segment);

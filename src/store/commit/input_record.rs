@@ -81,7 +81,7 @@ impl InputRecord {
         text.len() + INDENT * text.lines().count() + ",\n".len()
     }
 
-    /// Returns whether all numbers are in range.
+    /// Returns whether all numbers are at most [`MAX_NUMBER`].
     pub(in crate::store) fn is_sound(&self) -> bool {
         let content = self.content.as_ref();
         self.first_scan <= MAX_NUMBER && content.is_none_or(|content| content.scans <= MAX_NUMBER)

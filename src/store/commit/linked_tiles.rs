@@ -33,7 +33,7 @@ impl LinkedTiles<'_> {
         self.store.tiles().contains(tile)
     }
 
-    /// Links a tile of another map.
+    /// Links a tile of another map, and returns its version.
     ///
     /// # Errors
     ///

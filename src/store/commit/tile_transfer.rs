@@ -13,11 +13,11 @@ use std::path::Path;
 
 impl TileStore {
     /// Moves all tiles of `other` to the next versions of this map. `other` must have the same id, storage and file
-    /// system, and its tiles must be committed. It loses them.
+    /// system, and its tiles must be committed. Afterwards `other` lacks these files.
     ///
     /// # Errors
     ///
-    /// An existing folder that the log does not name, or an I/O error. `other` may have lost some of its tiles then.
+    /// An existing folder that the log does not name, or an I/O error. Some tiles may have been moved by then.
     pub fn swap_in(&mut self, other: &Self) -> Result<()> {
         self.finish_earlier_work()?;
         let mut tiles: Vec<_> = other.tiles().iter().collect();
@@ -97,7 +97,8 @@ impl TileStore {
         self.files.sync_folder(&layout.tile_folder(tile))
     }
 
-    /// Makes another valid table of the tile its next version, as a hard link if possible, else as a copy.
+    /// Makes the file `table`, another valid table of the tile, its next version: as a hard link if possible, else as a
+    /// copy.
     ///
     /// # Errors
     ///

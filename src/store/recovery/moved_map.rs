@@ -21,7 +21,7 @@ use std::sync::Arc;
 /// # Errors
 ///
 /// An existing destination, a map with a writer, a file that is missing or of another length, or an I/O error. If the
-/// map was moved already, it is lost.
+/// error occurs after the map was renamed, the map is deleted.
 pub fn move_map(disk: &Arc<dyn Disk>, map: &Path, folder: &Path) -> Result<bool> {
     path_check::check_path(&**disk, folder)?;
     check_is_free(&**disk, folder)?;

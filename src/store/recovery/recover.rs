@@ -65,10 +65,10 @@ pub(in crate::store) fn recover(
             State::Unrenamed => {
                 leftovers.unrenamed.insert(tile, ());
             }
-            // Created for a tile that was never committed, or left of a removed tile.
+            // An empty folder is left of a tile that was never committed, or of a removed tile.
             State::Empty if version.is_none() => empty_folders.push(tile),
             State::Empty => {}
-            // The store completes its removal.
+            // The checkpoint completes the removal of this tile.
             State::Orphan if removed.contains(&tile) => {}
             State::Orphan => {
                 leftovers.orphans.insert(tile);
@@ -85,8 +85,8 @@ pub(in crate::store) fn recover(
     Ok(leftovers)
 }
 
-/// Removes unused replacements of the map's own files. A replacement of a list of scans whose original is in quarantine
-/// is renamed instead. Returns the number of removed files.
+/// Removes unused `*.next` files in the map's folder. If the damaged list of scans is in quarantine, its replacement is
+/// renamed instead. Returns the number of removed files.
 pub(in crate::store) fn settle_own_files(disk: &dyn Disk, layout: &Layout) -> Result<u64> {
     let mut removed = 0;
     for name in OWN_NEXT {
@@ -94,7 +94,7 @@ pub(in crate::store) fn settle_own_files(disk: &dyn Disk, layout: &Layout) -> Re
     }
     let (scans, next) = (layout.scans(), layout.scans_next());
     match kind(disk, &scans)? {
-        // It was synced before the damaged file was moved.
+        // The replacement was synced before the damaged file was moved.
         None if matches!(kind(disk, &next)?, Some(EntryKind::File(_))) => {
             tolerate(disk.rename(&next, &scans), &next, "rename")?;
             tolerate(disk.sync_folder(layout.folder()), layout.folder(), "sync")?;
@@ -244,7 +244,8 @@ fn look_at_tile(
             if waits == Content::Committed || is_of_last_commit {
                 let in_place = content_of(disk, &layout.current(tile, file), committed)?;
                 if in_place != Content::Committed {
-                    // If neither is the committed version, the tile is damaged, which reading it reports. Keep both.
+                    // If neither is the committed version, the tile is damaged. Keep both files: reading the tile
+                    // reports the damage.
                     unrenamed |= waits.is_only_committed(in_place);
                     continue;
                 }
@@ -302,7 +303,7 @@ fn kind(disk: &dyn Disk, path: &Path) -> Result<Option<EntryKind>> {
     }
 }
 
-/// Ignores a media error of a step that the next opening repeats.
+/// Logs a media error of a step and ignores it, because the next opening repeats the step.
 fn tolerate(result: io::Result<()>, path: &Path, action: &'static str) -> Result<()> {
     match result {
         Err(error) if is_of_medium(&error) => {

@@ -104,7 +104,7 @@ impl Salvage {
     }
 }
 
-/// Returns whether the error reports something other than a regular file.
+/// Returns whether the error is that the path is not a regular file.
 fn is_no_file(error: &Error) -> bool {
     matches!(error, Error::Io { cause, .. } if cause.kind() == io::ErrorKind::InvalidInput)
 }

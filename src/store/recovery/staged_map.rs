@@ -155,7 +155,7 @@ pub(super) fn remove_unfinished(disk: &dyn Disk, folder: &Path) -> Result<()> {
         Some(_) => return Err(not_of_a_map(folder)),
     }
     let layout = Layout::new(folder);
-    // Before the lock, which creates a file.
+    // Check the content before the lock is taken, because locking creates a file.
     check_content(disk, &layout)?;
     let _lock = WriterLock::take(disk, &layout)?;
     remove_content(disk, &layout, false)

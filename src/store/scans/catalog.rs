@@ -124,7 +124,7 @@ impl CatalogReader {
             .map(|at| u32::from_le_bytes([lengths[at], lengths[at + 1], lengths[at + 2], lengths[at + 3]]));
         self.payload.clear();
         if length != !complement || u64::from(length) > left - FRAME_BYTES {
-            // Read as far as the flush number.
+            // The length is invalid, so read only the flush number.
             self.payload.resize(size_of::<u64>().min((left - FRAME_BYTES) as usize), 0);
             self.input.read(&mut self.payload)?;
             return self.end_or_damage("a record with an invalid length");
@@ -159,9 +159,9 @@ impl CatalogReader {
 }
 
 impl CatalogReader {
-    /// Classifies an invalid record. It is the end of the catalog if an uncommitted flush may have begun to write it:
-    /// it has the number of a later flush, or zeros, which never reached the disk. Otherwise it is damage, as is any
-    /// invalid record in the part that the log names.
+    /// Classifies an invalid record. If its flush number is that of a later flush, or 0 because its bytes never reached
+    /// the disk, an uncommitted flush may have begun to write it: it is the end of the catalog. Otherwise it is damage,
+    /// as is any invalid record in the part that the log names.
     fn end_or_damage(&self, reason: &str) -> std::result::Result<Option<CatalogEntry>, DecodeError> {
         let number = self.payload.first_chunk().map_or(0, |bytes| u64::from_le_bytes(*bytes));
         if self.named.is_none() && (number == 0 || number > self.flush_number) {

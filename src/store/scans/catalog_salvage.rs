@@ -101,7 +101,7 @@ impl Salvage<'_> {
         let Some(mut input) = self.begin()? else { return Ok(()) };
         let (named, last_flush) = (self.as_of.catalog, self.as_of.flush_number);
         loop {
-            // The log names committed records only.
+            // Bytes after the part that the log names are not committed.
             if named.is_some_and(|named| at >= named.bytes) {
                 return Ok(());
             }
@@ -148,7 +148,8 @@ impl Salvage<'_> {
         }
     }
 
-    /// Opens the catalog after its header. A damaged header is reported, but its content is known from the file's name.
+    /// Opens the catalog after its header. A damaged header is reported, but reading continues, because all headers are
+    /// equal.
     fn begin(&mut self) -> Result<Option<BufReader<Box<dyn DiskRead>>>> {
         let opened = self.disk.open(&self.path).map(BufReader::new);
         if let Err(error) = &opened

@@ -18,8 +18,9 @@ impl CatalogVersion {
     /// Length in a record of the log.
     pub(in crate::store) const BYTES: usize = 20;
 
-    /// Returns whether this catalog, as of flush `last`, can contain a record of a flush: it is not older than the
-    /// catalog. A catalog that repair wrote for a snapshot has only records of one flush, its generation.
+    /// Returns whether this catalog, as of flush `last`, can contain records of a flush: from the flush that created
+    /// the catalog, its generation, up to `last`. A catalog that repair wrote for a snapshot is newer than `last` and
+    /// has only records of its generation.
     pub(super) fn has_flush(self, flush_number: u64, last: u64) -> bool {
         (self.generation..=last.max(self.generation)).contains(&flush_number)
     }

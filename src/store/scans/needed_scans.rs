@@ -30,7 +30,7 @@ impl TileStore {
     ///
     /// An I/O error, or an unreadable catalog, which may need any segment.
     pub fn release_scans(&mut self) -> Result<()> {
-        // An unreadable snapshot may need any of them.
+        // An unreadable snapshot may need any catalog or segment.
         let Some(flushes) = self.kept.snapshots().kept_scans_of(self.committer.snapshots()) else {
             return Ok(());
         };
@@ -178,8 +178,8 @@ pub(crate) fn kept_as_of(snapshot: &Snapshot) -> Option<KeptAsOf> {
     keeps_scans.then(|| KeptAsOf::last_of(&snapshot.commits))
 }
 
-/// Returns the catalogs and segments that no flush in `flushes` needs, in order, without new segments, and the highest
-/// segment that is needed.
+/// Returns the catalogs and segments that no flush in `flushes` needs, in order, and the highest segment that is
+/// needed. Segments for which `is_new` is true are omitted.
 ///
 /// # Errors
 ///
@@ -218,7 +218,8 @@ fn unneeded(
     Ok((names.iter().map(|name| folder.join(name)).collect(), highest))
 }
 
-/// Selects the flushes whose catalogs contain the records of all: of several versions of one catalog, the longest.
+/// Selects the flushes whose catalogs contain the records of all given flushes: of several versions of one catalog, the
+/// longest.
 ///
 /// # Errors
 ///

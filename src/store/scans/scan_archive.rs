@@ -393,7 +393,7 @@ impl ScanArchive {
         if !self.is_on {
             return Ok(None);
         }
-        // A committed catalog that will be replaced may be damaged.
+        // If the committed catalog will be replaced, it is not read, because it may be damaged.
         let committed = if self.replacement.is_some() { None } else { self.find_committed()? };
         self.copy_failed_segments()?;
         self.sync_segments()?;
@@ -418,7 +418,7 @@ impl ScanArchive {
                 Some(whole)
             }
             Some(Replacement::Whole(whole)) => {
-                // Written for a commit that failed later, perhaps with more entries.
+                // Written for a commit that failed later. The file may end with other entries of that commit.
                 self.replacement = Some(Replacement::Whole(whole));
                 Some(Catalog { has_excess: true, ..whole })
             }
@@ -434,7 +434,7 @@ impl ScanArchive {
         self.make_folder()?;
         let (disk, layout) = (&**self.files.disk(), self.files.layout());
         if let Some(begun) = self.begun.take().filter(|&begun| begun != flush_number) {
-            // Another commit was made in between.
+            // The catalog belongs to a failed commit, and another commit has been made since.
             self.files.remove_file(&layout.catalog(begun))?;
         }
         self.begun = in_place.is_none().then_some(flush_number);
@@ -496,7 +496,8 @@ impl ScanArchive {
         Ok(entries)
     }
 
-    /// Returns the catalog as of the last commit. Later records in the file may be truncated, damaged ones may not.
+    /// Verifies and returns the catalog as of the last commit. A writer may truncate the records after it. A damaged
+    /// catalog is an error, so that it is never truncated.
     pub(in crate::store) fn find_committed(&mut self) -> Result<Option<Catalog>> {
         if let Some(committed) = self.committed {
             return Ok(committed);

@@ -15,7 +15,7 @@ const HEADER: [u8; HEADER_BYTES] = *b"VXTSCANS\x01\0\0\0\0\0\0\0";
 /// State of `scans.bin` in a writer.
 #[derive(Debug, Default)]
 pub(in crate::store) struct ScanList {
-    /// Scans and rewinds of the next commit.
+    /// Scans and reverts of the next commit.
     pending: Vec<Entry>,
     /// Committed part, empty without a file; `None` before the file was read.
     committed: Option<Extent>,
@@ -93,7 +93,7 @@ impl ScanList {
             self.has_excess = false;
             return Ok(before);
         }
-        // True until these entries are committed.
+        // The file is longer than its committed part until these entries are committed.
         self.has_excess = true;
         let write = || -> io::Result<()> {
             let mut out = match before.bytes() {
@@ -185,7 +185,7 @@ impl TileStore {
     }
 }
 
-/// Finds the committed part. A damaged list is copied to quarantine.
+/// Finds the committed part of the list. A damaged list is copied to quarantine.
 fn find_end(disk: &dyn Disk, layout: &Layout, committed: u64, records: Option<u64>) -> Result<Found> {
     let (mut found, path) = (Extent::default(), layout.scans());
     let read = for_each_record(disk, layout, committed, &mut |_, _| found.records += 1);
@@ -226,7 +226,7 @@ pub(crate) fn read_scans(
     for_each_committed(disk, layout, flush_number, records, &mut |flush, entry| {
         entries.push((flush, entry))
     })?;
-    // Backwards over reverts: before each revert, the list is that of the flush to which it reverted.
+    // Read backwards: of the entries before a revert, only those up to the flush to which it reverted count.
     let (mut parts, mut end) = (Vec::new(), entries.len());
     loop {
         let before = &entries[..end];

@@ -35,7 +35,7 @@ impl KeptTables {
         &self.snapshots
     }
 
-    /// Replaces the tables that snapshots use. Tables that none of them uses any more are kept for readers.
+    /// Replaces the list of tables that snapshots use. Tables that no snapshot uses any more are kept for readers.
     pub(in crate::store) fn set_snapshots(&mut self, snapshots: SeenTables) {
         let before = std::mem::replace(&mut self.snapshots, snapshots);
         for (&tile, flushes) in before.pinned() {
@@ -76,7 +76,7 @@ impl KeptTables {
         self.snapshots.sees_kept(tile, flush_number)
     }
 
-    /// Records that the kept table of a tile is durable. No snapshot uses its replacement.
+    /// Records that the kept table of a tile is durable. No snapshot uses the table that replaces it.
     pub(in crate::store) fn is_durable(&mut self, tile: TileIndex) {
         self.snapshots.unshare(tile);
     }

@@ -5,10 +5,10 @@ use crate::store::layout::Layout;
 use rustc_hash::FxHashMap;
 use std::io;
 
-/// Readers of a map, and the replaced tables kept for them: for each tile, one version per flush that is read.
+/// Readers of a map, and the replaced tables kept for them: for each tile, one version per flush that a reader uses.
 ///
 /// A reader keeps the `metadata.json` open that it found when it opened the map. Every flush replaces this file, and
-/// the writer watches all versions. So it knows which flushes are read.
+/// the writer watches all versions, so the writer knows which flushes are in use.
 #[derive(Default)]
 pub(in crate::store) struct Readers {
     /// Versions of `metadata.json` from past flushes and the current one, in order.

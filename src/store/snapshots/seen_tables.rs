@@ -16,7 +16,7 @@ pub(in crate::store) type KeptFlushes = FxHashMap<TileIndex, BTreeSet<u64>>;
 /// Tables that a map's snapshots use, so that its writer keeps them.
 ///
 /// A snapshot of flush `n` uses, for each of its tiles, the table that was kept as of the first flush not before `n`.
-/// If there is none, it uses the current table. Readers follow the same rule. It only needs file names.
+/// If there is none, it uses the current table. Readers follow the same rule. The rule needs only file names.
 #[derive(Debug, Default)]
 pub(in crate::store) struct SeenTables {
     /// Tiles whose current table a snapshot uses.
@@ -112,7 +112,7 @@ impl SeenTables {
         self.kept_scans.insert(snapshot.name.clone(), kept_as_of(snapshot));
     }
 
-    /// Returns the kept scans that the snapshots of this list need; `None` if one of them is unknown.
+    /// Returns the kept scans that the snapshots of this list need; `None` if those of one snapshot are unknown.
     pub(in crate::store) fn kept_scans_of(&self, listed: Option<&SnapshotList>) -> Option<Vec<KeptAsOf>> {
         let names = listed.into_iter().flat_map(SnapshotList::names);
         let needed = names.map(|name| self.kept_scans.get(name).copied());
@@ -148,7 +148,7 @@ impl SeenTables {
         self.pinned.entry(tile).or_default().insert(flush_number);
     }
 
-    /// Records that a kept table is durable. No snapshot uses its replacement yet.
+    /// Records that a kept table is durable. No snapshot uses the table that replaces it yet.
     pub(in crate::store) fn unshare(&mut self, tile: TileIndex) {
         self.shared.remove(tile);
     }

@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 #[serde(transparent)]
 pub struct SnapshotList(BTreeMap<SnapshotName, Option<u64>>);
 
-/// Maximum number of snapshots of a map: the list is part of `metadata.json`, which is read at once.
+/// Maximum number of snapshots of a map. The list is part of `metadata.json`, which is read into memory as a whole.
 pub(in crate::store) const MAX_SNAPSHOTS: usize = 4096;
 
 impl SnapshotList {

@@ -18,9 +18,8 @@ pub struct SnapshotWriter<'a> {
 }
 
 impl SnapshotWriter<'_> {
-    /// Keeps the last commit under a name until the snapshot is deleted. Its tables are kept when they are replaced.
-    /// Uncommitted changes are not part of the snapshot. When this returns the snapshot is durable; after an error
-    /// there is none.
+    /// Creates a snapshot of the last commit. Its tables are kept on disk when later flushes replace them. Uncommitted
+    /// changes are not part of the snapshot. When this returns the snapshot is durable; after an error there is none.
     ///
     /// If a snapshot of this name and this state exists, nothing is done.
     ///
@@ -116,7 +115,7 @@ impl SnapshotWriter<'_> {
         Ok(())
     }
 
-    /// Deletes a snapshot, and the tables that no other one uses. Damaged, unreadable and missing snapshots can be
+    /// Deletes a snapshot, and the tables that no other snapshot uses. Damaged, unreadable and missing snapshots can be
     /// deleted too. If a deletion was interrupted after its commit, opening the map has finished it, and this returns
     /// without an error.
     ///
@@ -210,7 +209,8 @@ impl SnapshotWriter<'_> {
         Ok(())
     }
 
-    /// Writes a catalog for a snapshot in a commit of its own. Until the snapshot names it, it is unreferenced.
+    /// Writes a catalog for a snapshot in a commit of its own. Nothing uses the catalog until the snapshot's file names
+    /// it.
     ///
     /// # Errors
     ///
@@ -221,7 +221,7 @@ impl SnapshotWriter<'_> {
         write: impl FnOnce(&mut dyn FnMut(&CatalogEntry) -> Result<()>) -> Result<()>,
     ) -> Result<CatalogVersion> {
         self.store.finish_earlier_work()?;
-        // Afterwards the newest catalog is not that of the map.
+        // After this, the newest catalog is not the map's own, so the log must name the map's own.
         self.store.try_to_name_own_catalog()?;
         let catalog = self.store.archive.write_other(write)?;
         let listed = self.store.snapshots().list().cloned().unwrap_or_default();

@@ -27,8 +27,8 @@ impl TileValue for SpillFile {
     }
 }
 
-/// Updates of tiles that exceed memory, in files in the tile folders. These files are not part of the map: no commit
-/// names them, and opening the map removes them.
+/// Updates of tiles that do not fit in memory, in files in the tile folders. These files are not part of the map: no
+/// commit names them, and opening the map removes them.
 #[derive(Clone, Debug)]
 pub struct SpillFiles {
     files: MapFiles,

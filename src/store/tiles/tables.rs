@@ -47,7 +47,7 @@ impl<'a> Tables<'a> {
         }
     }
 
-    /// Returns the path of a snapshot's version of a table, unless a writer moves it.
+    /// Returns the path of a snapshot's version of a table. A writer may rename the file at any time.
     fn path_in_snapshot(self, tile: TileIndex) -> Result<PathBuf> {
         let kept = self.kept(tile)?;
         Ok(match seen_by(Some(&kept), self.store.commits().flush_number) {
@@ -94,7 +94,7 @@ impl<'a> Tables<'a> {
         Ok(places.collect())
     }
 
-    /// Opens one of [`Tables::other_places`].
+    /// Opens the table at one of the paths of [`Tables::other_places`].
     ///
     /// # Errors
     ///

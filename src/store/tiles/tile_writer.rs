@@ -24,8 +24,8 @@ impl TileWriter {
         Self { files, map_id, keeps_earlier: false }
     }
 
-    /// Keeps an earlier next version until the new one is complete: it can be read meanwhile, and an error does not
-    /// lose it.
+    /// Keeps the `*.next` file that was written before until the new one is complete, so that it can be read meanwhile
+    /// and is not lost on an error.
     pub fn keeping_earlier(self) -> Self {
         Self { keeps_earlier: true, ..self }
     }

@@ -170,7 +170,7 @@ mod tests {
             let mut bytes = random_entries(&mut random, round % 40 * 20);
             if !bytes.is_empty() && random.chance(0.7) {
                 let entry = random.below(bytes.len() as u64) as usize;
-                // Mostly in the key, where most bit flips are damage.
+                // Mostly in the key, where most flipped bits make the entry invalid.
                 let end = if random.chance(0.7) { 6 } else { ENTRY_BYTES };
                 bytes[entry][random.below(end) as usize] ^= 1 << random.below(8);
             }

@@ -35,7 +35,8 @@ const fn packed_key(brick: BrickCode, place: usize) -> u64 {
     x as u64 | (y as u64) << 16 | (z as u64) << 32
 }
 
-/// Keys of the first brick's voxels; those of other bricks differ from them by the bits of their first voxel.
+/// Keys of the voxels of the first brick. The keys of another brick are these, combined with the key of its first
+/// voxel.
 static KEYS_IN_BRICK: [u64; BRICK_VOXELS] = {
     let mut keys = [0; BRICK_VOXELS];
     let mut place = 0;

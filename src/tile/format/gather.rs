@@ -16,7 +16,7 @@ pub(super) trait Gather {
     /// Returns the result for all voxels.
     fn made(self) -> Self::Made;
 
-    /// Returns the result for a table that had to be built.
+    /// Returns the result for a table, which is built first if the entries of the file are in any order.
     fn of_table(self, table: Table) -> Self::Made;
 }
 

@@ -30,11 +30,11 @@ pub struct OctreeQueueCounts {
     pub voxels_in: u64,
     /// Batches dequeued, including those that a sync had already written or whose tile was evicted.
     pub batches_out: u64,
-    /// Voxels dequeued, likewise.
+    /// Voxels in the dequeued batches.
     pub voxels_out: u64,
     /// Maximum number of batches in the queue, including the one being written.
     pub peak_batches: u64,
-    /// Maximum number of voxels in the queue, likewise.
+    /// Maximum number of voxels in the queue, including those of the batch being written.
     pub peak_voxels: u64,
     /// Number of voxels from which the queue is full; a single batch may be larger.
     pub limit_voxels: u64,

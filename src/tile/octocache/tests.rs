@@ -72,7 +72,9 @@ fn assert_answers(tile: &Tile) {
 }
 
 fn tree_of(tile: &Tile) -> Arc<SharedTree> {
-    let TileOctree::Pointers(octree) = tile.tile_octree() else { unreachable!("the factory makes these") };
+    let TileOctree::Pointers(octree) = tile.tile_octree() else {
+        unreachable!("the factory creates pointer octrees")
+    };
     octree.shared_tree().clone()
 }
 
@@ -93,7 +95,7 @@ fn queries_see_pending_batches_newest_first() {
     assert_eq!(
         (batches_in_flight(&tile), tree_of(&tile).node_count()),
         (4, 0),
-        "nothing has come to the tree"
+        "the worker is blocked, so no batch is written"
     );
     drop(gate);
     wait_for_worker(&octrees);
@@ -131,7 +133,7 @@ fn a_panic_during_a_write_loses_no_updates() {
     update(&mut tile, 0..200, true);
     let tree = tree_of(&tile);
     let job = move || {
-        tree.change(|_| panic!("a panic that a test wants"));
+        tree.change(|_| panic!("a panic for this test"));
     };
     assert!(octrees.worker().queue().push(0, Box::new(job)).is_ok());
     wait_for_worker(&octrees);
@@ -273,7 +275,7 @@ fn closing_a_full_queue_writes_its_batches_and_ends_the_thread() {
         assert_answers(tile);
     }
     drop((tile, late));
-    assert!(queue.upgrade().is_none(), "only the worker's thread could still have it");
+    assert!(queue.upgrade().is_none(), "the worker's thread must have ended and dropped the queue");
 }
 
 #[test]

@@ -114,7 +114,7 @@ impl VoxelCache {
             self.cell_bytes += (bucket.capacity() - capacity) * size_of::<Cell>();
             self.len += 1;
         }
-        // Also during a scan, because buckets with a whole first scan would be slow to search.
+        // Grow during a scan too: otherwise a first scan would make buckets that are too long to search.
         if self.fits_itself && self.voxels_of_scan * CELLS_PER_SCAN_VOXEL > self.buckets.len() * self.tau {
             self.grow(self.buckets.len() * 2);
         }

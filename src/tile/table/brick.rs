@@ -158,7 +158,7 @@ impl Brick {
         }
     }
 
-    /// Upper bound of the voxels' log-odds, apart from rounding.
+    /// Upper bound of the voxels' log-odds, rounded to `f32`.
     #[inline]
     pub(crate) fn bound(&self) -> f32 {
         self.summary.max

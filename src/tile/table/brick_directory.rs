@@ -1,6 +1,6 @@
 use crate::space::{BrickCode, MortonCode, Torus, VoxelKey};
 
-/// Directory of the bricks of a tile, by blocks of 4 x 4 x 4 bricks, of which a tile has few.
+/// Directory of the bricks of a tile. Bricks are grouped in blocks of 4 x 4 x 4, and a tile has few blocks.
 #[derive(Clone, Debug)]
 pub(crate) struct BrickDirectory {
     blocks: Torus,
@@ -34,8 +34,8 @@ pub(crate) struct Address {
 impl Address {
     #[inline]
     pub(crate) fn of_key(key: VoxelKey) -> Self {
-        // The lower three of the lowest five bits are the position in a brick, the others that of the brick in its
-        // block.
+        // Of the lowest five bits of a coordinate, the lower three are the position in the brick, and the upper two are
+        // the position of the brick in its block.
         let part = |k: usize| SPREAD[usize::from(key.0[k] & 31)] << k;
         let code = usize::from(part(0) | part(1) | part(2));
         Self { block: key.0.map(|k| i32::from(k >> 5)), brick: code >> 9, place: code & 511 }
@@ -72,10 +72,10 @@ impl BrickDirectory {
             + self.marks.capacity() * size_of::<u64>()
     }
 
-    /// Number of the brick at an address, or 0.
+    /// Number of the brick at an address; 0 if it is absent.
     #[inline]
     pub(crate) fn get(&self, at: Address) -> u32 {
-        // Branchless, because presence is unpredictable.
+        // Branchless, because the CPU cannot predict whether a brick exists.
         self.in_block(self.block(at), at)
     }
 

@@ -104,7 +104,7 @@ impl Table {
     }
 
     /// Visits the lowest voxels of bricks that intersect a box and may contain log-odds of at least a threshold.
-    /// Returns `false` without visiting any if these bricks are not tracked.
+    /// Returns `false`, without visiting any, if the table does not track the bricks for this threshold.
     pub(crate) fn visit_marked(
         &self,
         voxels: &VoxelBox,

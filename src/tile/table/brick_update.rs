@@ -48,7 +48,7 @@ impl Brick {
         for word in 0..8 {
             rest.misses[word] &= !(rest.weak[word] & self.observed[word]);
         }
-        // Not by comparison, which would be a function call.
+        // Not `hits != [0; 8]`, because comparing arrays would call a function.
         let has_hits = rest.hits.iter().fold(0, |all, word| all | word) != 0;
         self.summary.note_change(if has_hits { f32::INFINITY } else { palette.max_after_miss() });
         match &mut self.evidence {
@@ -76,8 +76,8 @@ impl Brick {
         })
     }
 
-    /// Applies runs and removes them from the list: all of them, unless the palette is full or the brick does not use
-    /// it. Returns the number of voxels observed for the first time.
+    /// Applies runs and removes them from the list. Stops early if the palette is full or the brick does not use the
+    /// palette. Returns the number of voxels observed for the first time.
     pub(crate) fn update_runs(
         &mut self,
         left: &mut BrickRuns<'_>,
@@ -224,7 +224,7 @@ fn update_interned(
         let (mut misses, mut hits) = (rest.misses[word], rest.hits[word]);
         let touched = misses | hits;
         let mut result = Ok(());
-        // An unobserved voxel needs no special case: its state has steps like any other.
+        // An unobserved voxel needs no special case: its state has a next state like any other.
         while misses != 0 {
             let state = &mut cell[misses.trailing_zeros() as usize];
             match palette.after_miss(*state) {

@@ -5,7 +5,7 @@ pub(crate) const CELL_VOXELS: usize = 64;
 
 /// Values for all voxels of a brick, in cells of 4 x 4 x 4. A cell takes memory once one of its voxels is set.
 ///
-/// Smaller cells would save a third of the memory on a street, but each update would have to count bits.
+/// Smaller cells would save a third of the memory for a street, but each update would have to count bits.
 #[derive(Clone, Debug)]
 pub(crate) struct Cells<T> {
     /// Position in `cells` for each word of a mask, or [`ABSENT`].
@@ -53,7 +53,7 @@ impl<T: Copy> Cells<T> {
         if missing == 0 {
             return;
         }
-        // Exact, because this happens at most eight times per brick.
+        // Reserve no spare space, because this happens at most eight times per brick.
         self.cells.reserve_exact(missing.count_ones() as usize);
         for word in (0..8).filter(|word| missing >> word & 1 == 1) {
             self.places[word] = self.cells.len() as u8;

@@ -1,7 +1,7 @@
 use super::palette::StateId;
 
-/// Cache of the states after runs of misses. The states within a run seldom recur, but runs of equal length do: equally
-/// many rays pass adjacent voxels.
+/// Cache of the state that a voxel has after a run of misses. Adjacent voxels are passed by equally many rays, so the
+/// same runs often recur. The states within a run do not.
 ///
 /// Valid as long as the states keep their numbers.
 pub(crate) struct MissRuns(Vec<Entry>);

@@ -20,7 +20,7 @@ pub(crate) const UNKNOWN: StateId = 0;
 #[derive(Clone, Debug)]
 pub(crate) struct Palette {
     model: SensorModel,
-    /// Largest log-odds that a miss can lead to, unless they were larger before.
+    /// A miss never raises log-odds above this value.
     max_after_miss: f32,
     evidence: Vec<Evidence>,
     next: Vec<Next>,
@@ -99,7 +99,7 @@ impl Palette {
         }
     }
 
-    /// Largest log-odds that a miss can lead to, unless they were larger before.
+    /// A miss never raises log-odds above this value.
     #[inline]
     pub(crate) fn max_after_miss(&self) -> f32 {
         self.max_after_miss
@@ -179,7 +179,7 @@ impl Palette {
     fn first_hit(&mut self, before: StateId, intensity: f32) -> Result<StateId, Full> {
         let hit = Observation::Hit(intensity);
         let after = self.intern(self.model.update(Some(self.evidence(before)), hit))?;
-        // If the intensity is used, the next hit leads to another state.
+        // If the model uses the intensity, the state after a hit depends on it and cannot be cached.
         if !self.model.needs_intensity() {
             self.next[usize::from(before)].hit = after;
         }

@@ -9,7 +9,7 @@ pub(crate) struct Summary {
     pub(crate) nodes: u16,
     /// Whether the brick is one leaf: all 512 voxels are known and have the same value.
     pub(crate) is_leaf: bool,
-    /// Whether the brick has changed since.
+    /// Whether the brick has changed since the summary was computed.
     pub(crate) is_stale: bool,
 }
 
@@ -32,7 +32,7 @@ impl Summary {
     /// threshold of most maps.
     pub(crate) const MARKED_ABOVE: f32 = -0.05;
 
-    /// Returns whether all unmarked bricks are below this threshold.
+    /// Returns whether the log-odds of all unmarked bricks are below this threshold.
     #[inline]
     pub(crate) fn are_marks_for(threshold: f64) -> bool {
         threshold > f64::from(Self::MARKED_ABOVE.next_up())
@@ -49,7 +49,7 @@ impl Summary {
 impl From<(BrickNodes, f32)> for Summary {
     fn from((nodes, max): (BrickNodes, f32)) -> Self {
         let is_leaf = nodes.leaf.is_some();
-        // At most 585.
+        // A brick has at most 585 nodes.
         Self { max, nodes: nodes.node_count() as u16, is_leaf, is_stale: false }
     }
 }

@@ -136,7 +136,8 @@ impl Table {
     ) {
         self.palette.use_model(model);
         let first = VoxelKey::from_index(first).0;
-        // Rays visit the same few bricks repeatedly; nearby bricks have different entries.
+        // Cache of brick numbers: rays visit the same few bricks repeatedly. Bricks close to each other have different
+        // entries.
         let mut recent = [(u64::MAX, 0); 512];
         for (offset, observation) in updates.iter() {
             let key: [u16; 3] = std::array::from_fn(|k| first[k].wrapping_add(offset[k] as u16));
@@ -225,12 +226,12 @@ impl Table {
         }
     }
 
-    /// Makes new states possible for a brick when the palette is full: drops unused states, or otherwise makes the
-    /// brick plain.
+    /// Makes new states possible for a brick when the palette is full: drops unused states or, if that is not enough,
+    /// stores the brick's evidence without the palette.
     #[cold]
     fn make_room_for(&mut self, number: usize) {
-        // At the largest limit, unused states are searched for only after enough bricks became plain, so that the cost
-        // remains proportional.
+        // At the largest limit, search for unused states only after an eighth of the bricks has stopped using the
+        // palette, so that the searches take little time per brick.
         if self.palette.can_grow() || self.made_plain * 8 >= self.bricks.len() {
             let mut in_use = vec![false; self.palette.len()];
             self.bricks.iter().for_each(|brick| brick.mark_states(&mut in_use));

@@ -6,8 +6,8 @@ use super::unpadded_evidence::UnpaddedEvidence;
 use crate::sensor::Evidence;
 use crate::space::VoxelKey;
 
-/// Batch of voxels of any tables that are looked up together, one stage after the other for all of them, so that the
-/// CPU waits for the memory of many voxels at once.
+/// Batch of voxels, of any tables, that are looked up together. Each stage of the look-up is done for all voxels before
+/// the next stage, so that the CPU waits for the memory of many voxels at once.
 pub(crate) struct VoxelBatch<'a> {
     voxels: Vec<(&'a Table, Address)>,
 }

@@ -21,7 +21,7 @@ pub enum Act {
         seed: u64,
         rest: Option<u64>,
     },
-    /// The same as an online remap, while a mapper inserts scans with these seeds and flushes each.
+    /// Like `Move`, but as an online remap, while a mapper inserts scans with these seeds and flushes after each.
     MoveOnline {
         seed: u64,
         rest: Option<u64>,

@@ -44,7 +44,7 @@ impl<T: PartialEq + Debug> Subject for Job<T> {
 
     fn run(&self, disk: &FaultyDisk, from: usize) -> Reached {
         let end = match (self.work)(disk) {
-            // The next writer completes a commit.
+            // The map exists already. Opening it for writing completes the commit.
             Err(Error::AlreadyExists { .. }) if from == 1 => {
                 TileStore::open(disk.shared(), &self.map).map(drop)
             }

@@ -33,7 +33,8 @@ impl Life {
         Self { has_links: false, ..self }
     }
 
-    /// An interrupted online remap leaves the scans that were flushed before it. Completes that act.
+    /// An interrupted online remap leaves the map with the scans that were flushed during it. Inserts the remaining
+    /// scans and repeats the remap.
     fn complete_online_remap(&self, disk: &FaultyDisk, number: usize, what: &str) {
         let (before, Some(Act::MoveOnline { seed, rest, meanwhile })) =
             (&self.states[number], self.acts.get(number))

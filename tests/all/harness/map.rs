@@ -23,7 +23,7 @@ pub fn name(name: &str) -> SnapshotName {
     SnapshotName::new(name).unwrap()
 }
 
-/// A map of few voxels, with memory for two tiles and almost no waiting updates: every scan evicts tiles.
+/// A map of few voxels, with memory for two tiles and a tiny write buffer: every scan evicts tiles.
 pub fn config() -> MapConfig {
     MapConfig::new(0.4, 3.2).unwrap().with_range(0.0, 3.0).with_cache_tiles(2).with_write_buffer_bytes(600)
 }

@@ -69,7 +69,7 @@ fn free_voxels_stay_free_after_any_decay() {
     assert!(matches!(reader.occupancy_at([4.75, 0.25, 0.25]).unwrap(), Occupancy::Occupied(_)));
     let tree = reader.merged_octree(None, 1 << 20).unwrap();
     let occupied = tree.leaves().filter(|leaf| leaf.value >= 0.0).count();
-    assert_eq!(occupied, 1, "as octree, too");
+    assert_eq!(occupied, 1, "the octree must have one occupied leaf");
 }
 
 /// A map of some scans.

@@ -71,7 +71,7 @@ fn make_local(disk: &FaultyDisk) -> Result<()> {
     mapper.flush()
 }
 
-/// The same for a crop of another map.
+/// Like [`move_shard`], for a crop of another map.
 fn move_crop(disk: &FaultyDisk) -> Result<()> {
     disk.take(&path("local"));
     let crop = open(disk, &path("a"))
@@ -87,7 +87,7 @@ fn move_crop(disk: &FaultyDisk) -> Result<()> {
 /// A disk with two shards of `a`.
 fn two_shards(storage: Storage) -> FaultyDisk {
     let disk = two_maps(storage);
-    // A border between tiles.
+    // The upper bound along x is a border between tiles.
     let west = Aabb { min: [-100.0; 3], max: [3.2, 100.0, 100.0] };
     for (name, part) in [("inside", Part::Inside(west)), ("outside", Part::Outside(west))] {
         operations::crop(&open(&disk, &path("a")).unwrap(), &part, path("crop"), |_, _| {}).unwrap();
@@ -106,7 +106,7 @@ fn join(disk: &FaultyDisk) -> Result<()> {
 fn replace_tiles(disk: &FaultyDisk) -> Result<()> {
     const OF_FLUSH: u64 = 2;
     if open(disk, &path("a"))?.flush_number() > OF_FLUSH {
-        // The next writer completes a commit.
+        // Opening the map for writing completes the commit.
         return TileStore::open(disk.shared(), &path("a")).map(drop);
     }
     let map = MapPath::on(disk.shared(), path("a"));
@@ -128,7 +128,7 @@ fn a_map_with_kept_scans(storage: Storage) -> FaultyDisk {
     disk.copy()
 }
 
-/// Memory for one tile, so that tiles are written before the end.
+/// Rebuilds a map with memory for one tile, so that tiles are written before the end.
 fn rebuild(disk: &FaultyDisk) -> Result<()> {
     let map = open(disk, &path("a"))?;
     let config = MapConfig::new(0.2, 3.2)?.with_range(0.0, 3.0).with_storage(map.config().storage);
@@ -266,7 +266,7 @@ fn maps_of_the_original_format_are_cropped_and_cleared() {
     let disk = foreign();
     crop(&disk).unwrap();
     clear(&disk).unwrap();
-    // Both results have the same voxels, but only one is a new map.
+    // Both results have the same voxels. The crop is a new map; the other map was changed in place.
     assert_eq!(digest(&disk, "out"), digest(&disk, "a"));
     disk.take(&path("out"));
     // `a` has been converted to voxtile's format, `b` has not.

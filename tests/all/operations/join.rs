@@ -144,7 +144,7 @@ fn a_moved_map_equals_a_copied_shard() {
         let disk = one_map(storage);
         let copy = piece(&disk, &path("map"), ID).unwrap();
         let files = tiles(&disk, &copy);
-        // This map has another id, so it is copied, too.
+        // The map has an id other than `ID`, so it is copied, too.
         let moved = move_shard(&disk, &path("map"), ID).unwrap();
         assert_eq!(tiles(&disk, &moved), files);
         assert_eq!(open(&disk, &moved).unwrap().metadata().ext.as_ref().unwrap().map_id, "07".repeat(16));

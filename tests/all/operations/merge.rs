@@ -186,7 +186,8 @@ fn a_damaged_tile_is_named_and_no_map_is_written() {
     assert!(disk.files().keys().all(|path| path.starts_with(&maps[0]) || path.starts_with(&maps[1])));
 }
 
-/// The system is that of any map that names one. Maps with different systems are incompatible in any order.
+/// The result has the coordinate reference system of the maps that have one. Maps with different systems are
+/// incompatible in any order.
 #[test]
 fn a_merge_keeps_the_coordinate_reference_system_of_its_maps() {
     let systems = [None, Some("EPSG:25832"), Some("EPSG:25833")];

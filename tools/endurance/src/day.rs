@@ -31,7 +31,7 @@ pub struct Part {
     pub flushes: u64,
     /// Mean CPU time of a scan, with all threads and flushes.
     pub cpu_ms: f64,
-    /// Wall time of the calls that insert a scan.
+    /// Wall times of the calls that insert a scan: median, 99.9th percentile and maximum.
     pub median_ms: f64,
     pub p999_ms: f64,
     pub worst_ms: f64,

@@ -25,7 +25,7 @@ pub struct WorkingSetFound {
     pub digest: String,
 }
 
-/// Tiles that the last scans touched, with the number of those scans.
+/// Tiles that the last scans touched, each with the number of these scans that touched it.
 #[derive(Default)]
 struct Window {
     scans: VecDeque<Vec<TileIndex>>,

@@ -207,7 +207,8 @@ fn in_many_orders(test: impl Fn() + Send + Sync + Copy + 'static) {
     // Writing a file needs a deeper stack than taking a lock.
     config.stack_size = 1 << 20;
     let test = move || {
-        // The scheduler refuses a first run without two concurrent threads, and a random run may be one.
+        // The scheduler fails if its first run has no two concurrent threads. A random run of a test may have only one,
+        // so start another.
         let other = shuttle::thread::spawn(shuttle::thread::yield_now);
         test();
         other.join().expect("it does nothing");

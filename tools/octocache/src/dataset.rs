@@ -10,7 +10,7 @@ use workload::SurveyName;
 pub struct Dataset {
     /// Name in tables and plots.
     pub name: &'static str,
-    /// Number of scans with about 30 million updates of rays together, at a resolution of 0.1 m.
+    /// Number of scans whose rays together update voxels about 30 million times, at a resolution of 0.1 m.
     pub some_scans: usize,
     source: Source,
 }
@@ -77,8 +77,8 @@ pub fn map_config(resolution_m: f64) -> Result<MapConfig> {
     Ok(MapConfig::new(resolution_m, voxels_per_tile_edge * resolution_m)?.with_range(0.0, MAX_RANGE_M))
 }
 
-/// The same with one large tile, and the scans moved so that they begin in its middle: as in the paper, there is one
-/// voxel cache and one octree, unless the scans leave the tile.
+/// Settings of a map with one large tile, and the scans moved so that they begin in its middle. As in the paper, there
+/// is then one voxel cache and one octree, if no scan leaves the tile.
 pub fn in_one_tile(resolution_m: f64, scans: Vec<Scan>) -> Result<(MapConfig, Vec<Scan>)> {
     let tile_size_m = f64::from(MAX_VOXELS_PER_TILE_EDGE) * resolution_m;
     let config = MapConfig::new(resolution_m, tile_size_m)?.with_range(0.0, MAX_RANGE_M);

@@ -14,7 +14,8 @@ use workload::ScanReader;
 const TOLERANCE: f64 = 1e-3;
 /// Minimum share of the voxels that agree with OctoMap.
 const MIN_AGREEMENT: f64 = 0.999;
-/// The same if every ray counts: a voxel differs if one of the many rays through it grazes it on one side only.
+/// Minimum share if every ray counts. It is lower: a voxel differs if only one of the programs counts one of the many
+/// rays that graze it.
 const MIN_AGREEMENT_PER_RAY: f64 = 0.99;
 const TILE_SIZE_M: f64 = 10.0;
 
@@ -31,7 +32,7 @@ struct Difference {
     other_value: usize,
 }
 
-/// Compares both with the naive map, voxel by voxel, after the first scans of a workload.
+/// Compares the maps of both contenders with the naive map, voxel by voxel, after the first scans of a workload.
 pub fn rows(
     workload: &Workload,
     files: &Files,

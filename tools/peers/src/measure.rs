@@ -26,7 +26,7 @@ struct Samples {
     known_answers: Pairs,
 }
 
-/// Measures speed and memory of both on a workload. Each run starts OctoMap, then voxtile's tasks.
+/// Measures speed and memory of both contenders on a workload. Each run starts OctoMap, then voxtile's tasks.
 pub fn rows(
     workload: &Workload,
     files: &Files,

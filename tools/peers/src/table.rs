@@ -21,7 +21,7 @@ pub struct Ratio {
     pub most: f64,
 }
 
-/// A target: floor and, optionally, goal.
+/// Target of a value: the floor that it must reach and, optionally, a goal.
 #[derive(Clone, Copy)]
 pub enum Target {
     /// For ratios.

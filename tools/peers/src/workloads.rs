@@ -50,7 +50,7 @@ pub struct Files {
     /// Folder of the files, which may hold others.
     pub folder: PathBuf,
     pub stream: PathBuf,
-    /// Their intensities, if any.
+    /// File of the intensities, if any.
     pub intensities: Option<PathBuf>,
 }
 
@@ -69,7 +69,7 @@ pub fn synthetic() -> Vec<Workload> {
     ]
 }
 
-/// Two of them, with few scans.
+/// Two of the workloads of [`synthetic`], with few scans.
 pub fn short() -> Vec<Workload> {
     let mut workloads = synthetic();
     workloads.retain(|workload| [0.2, 0.1].contains(&workload.resolution_m));

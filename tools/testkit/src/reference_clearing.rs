@@ -2,10 +2,10 @@ use std::collections::BTreeSet;
 use voxtile::Guard;
 use voxtile::space::VoxelIndex;
 
-/// The marks of one scan, for a naive form of guarded clearing.
+/// Hit and missed voxels of one scan, for a naive implementation of guarded clearing.
 pub struct ScanMarks {
     pub hit: BTreeSet<VoxelIndex>,
-    /// Passed and not hit.
+    /// Voxels that rays pass through and that no ray hits.
     pub missed: BTreeSet<VoxelIndex>,
     /// Voxel that contains the sensor.
     pub origin: VoxelIndex,
@@ -23,7 +23,7 @@ fn cube(first: VoxelIndex, edge: i32) -> impl Iterator<Item = VoxelIndex> {
 }
 
 impl ScanMarks {
-    /// Returns whether a missed voxel is missed in full.
+    /// Returns whether the miss of a missed voxel counts in full by the rule of [`Guard`].
     pub fn is_full(&self, voxel: VoxelIndex, guard: Guard) -> bool {
         self.is_open(voxel)
             || [2, 4].iter().any(|&edge| {
@@ -49,7 +49,7 @@ impl ScanMarks {
     }
 
     fn is_approached(&self, cell: VoxelIndex, guard: Guard) -> bool {
-        // In half voxels.
+        // From the center of the sensor's voxel to the center of the cell, in half voxels.
         let way: [i64; 3] = [0, 1, 2].map(|k| 4 * i64::from(cell[k]) + 2 - 2 * i64::from(self.origin[k]) - 1);
         let longest = way.map(i64::abs).into_iter().max().unwrap();
         self.is_clear(cell, 2)

@@ -10,7 +10,8 @@ pub fn message_of<T>(result: voxtile::Result<T>) -> String {
     }
 }
 
-/// Whether tests run all cases instead of a sample (`VOXTILE_TESTS=all`); about ten minutes with optimised code.
+/// Returns whether tests run all cases instead of a sample (`VOXTILE_TESTS=all`); about ten minutes with optimised
+/// code.
 fn is_every_case() -> bool {
     std::env::var_os("VOXTILE_TESTS").is_some_and(|wanted| wanted == "all")
 }

@@ -51,7 +51,7 @@ pub struct BuildArgs {
     /// Number of updates of a voxel per scan [default: per-scan; with --resume, the earlier value]
     #[arg(long, value_name = "MODE")]
     pub insert: Option<InsertName>,
-    /// Which misses of a scan change a voxel, for a new map [default: octomap, or the map's]
+    /// Rule that selects which misses of a scan clear known voxels, for a new map [default: octomap, or the map's]
     #[arg(long, value_name = "RULE")]
     pub clearing: Option<ClearingName>,
     /// Keep the scans in the map, compressed to about 10 bytes per point, for remap, remove-scans and remove-points. A
@@ -188,9 +188,9 @@ pub enum ModelName {
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
 pub enum ClearingName {
-    /// All, as in OctoMap. Rays that graze surfaces erase some of their voxels
+    /// All misses, as in OctoMap. Rays that graze a surface erase some of its voxels
     Octomap,
-    /// All but those near surfaces, which only make unknown voxels free. Keeps roads, walls and poles
+    /// Misses away from surfaces. Misses near surfaces only make unknown voxels free. Keeps roads, walls and poles
     Guarded,
 }
 

@@ -63,7 +63,7 @@ pub struct RemapArgs {
     /// With -o: number of updates of a voxel per scan [default: as each scan was mapped]
     #[arg(long, value_name = "MODE", requires = "output")]
     pub insert: Option<InsertName>,
-    /// With -o: which misses of a scan change a voxel [default: the map's]
+    /// With -o: rule that selects which misses of a scan clear known voxels [default: the map's]
     #[arg(long, value_name = "RULE", requires = "output")]
     pub clearing: Option<ClearingName>,
     /// With -o: sensor model that turns observations into log-odds [default: the map's]

@@ -19,7 +19,8 @@ use voxtile_pipeline::output::{OutputFile, is_standard_output};
 use voxtile_pipeline::{AnyMap, read_any_map};
 use voxtile_render::{ColorBy, Drawn, Picture, SideAxis, View};
 
-/// Draws a map and prints a summary unless `is_quiet`, on standard error if the picture is on standard output.
+/// Draws a map and prints a summary, to standard error if the picture is written to standard output. `is_quiet`
+/// suppresses the summary.
 pub fn run(args: &PictureArgs, is_quiet: bool) -> anyhow::Result<ExitCode> {
     let is_stream = is_standard_output(&args.output);
     if is_stream && io::stdout().is_terminal() {
@@ -143,7 +144,7 @@ fn check_color(map: &AnyMap, color: ColorName) -> Result<()> {
     }
 }
 
-/// Returns the snapshot of this name in the map, unless another map has this path.
+/// Returns the path of `since`: a map if such a path exists, else the snapshot of this name in `map`.
 fn state_before(map: &Path, since: &Path) -> PathBuf {
     if since.exists() || since.to_string_lossy().contains(['@', std::path::MAIN_SEPARATOR]) {
         return since.to_owned();

@@ -71,7 +71,8 @@ const MAX_FINDINGS: usize = 200;
 /// Maximum number of tiles on the page.
 const MAX_TILES: usize = 10;
 
-/// Writes the page and prints its path unless `is_quiet`, on standard error if the page is on standard output.
+/// Writes the page and prints its path, to standard error if the page is written to standard output. `is_quiet`
+/// suppresses the path.
 pub fn run(args: &ReportArgs, is_quiet: bool) -> anyhow::Result<ExitCode> {
     let report = Report::of(args)?;
     let mut file = OutputFile::create(&args.output)?;

@@ -232,8 +232,8 @@ fn write_histograms(out: &mut impl Write, survey: &Survey) -> io::Result<()> {
         .iter()
         .enumerate()
         .map(|(number, bin)| Bar {
-            from: format!("{} m", tenths(bin.from_m)),
-            to: format!("{} m", tenths(bin.to_m)),
+            from: format!("{} m", hundredths(bin.from_m)),
+            to: format!("{} m", hundredths(bin.to_m)),
             count: bin.occupied,
             color: colors::color_of(number as f64 / most as f64),
         })
@@ -312,7 +312,7 @@ fn rounded(number: f64) -> String {
     }
 }
 
-/// Rounds to tenths, without the sign of a zero.
-fn tenths(height_m: f64) -> f64 {
+/// Rounds a height to hundredths of a metre. Returns 0 instead of -0.
+fn hundredths(height_m: f64) -> f64 {
     (height_m * 100.0).round() / 100.0 + 0.0
 }

@@ -71,7 +71,7 @@ pub fn assert_whole(map: &Path) {
 }
 
 /// Adds scans to a map, with a flush after each.
-pub fn go_on(map: &Path, seed: u64, flushes: u64) {
+pub fn add_scans(map: &Path, seed: u64, flushes: u64) {
     let mut mapper = OutOfCoreTileMapper::open(map, config(Storage::OctoMap)).unwrap();
     for number in 0..flushes {
         mapper.insert_scan(&scan_at(seed + number, 20.0)).unwrap();

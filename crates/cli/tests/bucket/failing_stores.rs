@@ -1,6 +1,8 @@
 //! Tests with stores that fail, refuse requests, drop responses or lack objects.
 
-use crate::city::{KEEP, RESEND, city, config, digest, digest_there, go_on, message_of, push_now, scan_at};
+use crate::city::{
+    KEEP, RESEND, add_scans, city, config, digest, digest_there, message_of, push_now, scan_at,
+};
 use crate::faulty_store::{Fault, FaultyStore, Kind};
 use crate::server::Server;
 use std::sync::Arc;
@@ -30,7 +32,8 @@ fn an_unreachable_store_is_not_a_missing_map() {
         let error = message_of(on(fails.clone(), prefix).has_map(&|| false));
         assert!(error.contains("manifest.json") && error.contains("connection broke"), "{error}");
     }
-    // Without permission to list, S3 refuses to read a missing object. A file is no map.
+    // Without permission to list, S3 refuses to read a missing object instead of reporting it as missing. For the path
+    // of a file, such a refusal means that there is no map; for a folder it is an error.
     let refuses =
         FaultyStore::new(server.store.clone(), |request, _| match request.key.ends_with("manifest.json") {
             true => Fault::Refused,
@@ -61,7 +64,7 @@ fn a_push_with_a_lost_last_response_succeeds() {
     let bucket = Bucket::on(store, "maps/city", "s3://test/maps/city").unwrap();
     push_now(&map, &bucket);
     assert_eq!(digest_there(&bucket).unwrap(), digest(&map));
-    go_on(&map, 100, 1);
+    add_scans(&map, 100, 1);
     push_now(&map, &bucket);
     assert_eq!(digest_there(&bucket).unwrap(), digest(&map));
     assert!(std::fs::read_to_string(map.join("bucket_states")).unwrap().contains("there"));
@@ -113,7 +116,7 @@ fn a_map_damaged_in_the_bucket_is_resent() {
         resend().unwrap();
         check("the manifest");
     }
-    // A manifest of a later version is not damaged, and another map has another id.
+    // --resend replaces neither a manifest of a later version nor the manifest of another map.
     let text = String::from_utf8(server.get(&manifest)).unwrap();
     server.put(&manifest, text.replace("\"version\": 1", "\"version\": 2").into_bytes());
     assert!(message_of(resend()).contains("version is 2"));
@@ -146,7 +149,7 @@ fn an_interrupted_push_resumes() {
     push(map.as_path(), &at(&breaks), KEEP, |_, _| {}).unwrap_err();
     // A first push checks only its first objects for existence.
     assert!(breaks.requests(Kind::Head).len() < 48, "{}", breaks.requests(Kind::Head).len());
-    // Requests in flight complete.
+    // Wait for the requests in flight.
     std::thread::sleep(Duration::from_millis(200));
     let there = server.objects().len();
     assert_eq!(there, most);
@@ -172,7 +175,7 @@ fn an_interrupted_push_resumes() {
     assert_eq!(digest_there(&bucket).unwrap(), digest(&map));
 }
 
-/// An object with another length is not the expected one.
+/// An object with the expected name but another length is uploaded again.
 #[test]
 fn an_object_of_another_length_is_replaced() {
     let (server, folder) = (Server::new(), TempDir::new().unwrap());

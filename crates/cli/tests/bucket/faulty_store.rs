@@ -39,7 +39,7 @@ pub enum Fault {
     Refused,
     /// Fails like a broken connection.
     Fails,
-    /// Succeeds, but the client repeats it and the repetition fails its precondition.
+    /// Executes the request, and then reports a failed precondition, as if the client had repeated the request.
     DoneBefore,
     /// Returns half of the response.
     CutOff,

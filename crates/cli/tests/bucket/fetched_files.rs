@@ -26,7 +26,7 @@ fn files_are_fetched_and_removed_after_use() {
     for (name, content) in &files {
         server.put(&Key::from(format!("drive/{name}")), content.clone());
     }
-    // Not files of another drive, and no placeholder objects of folders.
+    // These must not be fetched: a file of another drive, and a placeholder object of a folder.
     server.put(&Key::from("drive2/other.pcd"), vec![1]);
     server.put(&Key::from("drive/scans"), Vec::new());
     let at = |prefix: &str| Bucket::on(server.store.clone(), prefix, "s3://test/drive").unwrap();

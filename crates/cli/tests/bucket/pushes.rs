@@ -1,7 +1,7 @@
 //! Push, remote read and pull of maps, compared with the map in its folder.
 
 use crate::city::{
-    KEEP, PRUNE, REPLACE, assert_whole, city, config, digest, digest_there, files_of, go_on, message_of,
+    KEEP, PRUNE, REPLACE, add_scans, assert_whole, city, config, digest, digest_there, files_of, message_of,
     open, push_now, scan_at,
 };
 use crate::server::Server;
@@ -23,7 +23,7 @@ fn a_pushed_map_is_readable_and_can_be_pulled() {
         let (server, folder) = (Server::new(), TempDir::new().unwrap());
         let (map, bucket) = (folder.path().join("map"), server.bucket());
         assert!(matches!(open(&bucket), Err(Error::NoMap { .. })));
-        // The mapper remains open: a push runs concurrently.
+        // The mapper remains open, because a push may run concurrently with a writer.
         let mut mapper = city(&map, storage, keeps_scans);
         let pushed = push_now(&map, &bucket);
         assert_eq!((pushed.tiles, pushed.tiles_sent), (mapper.statistics().tiles, pushed.tiles));
@@ -37,7 +37,7 @@ fn a_pushed_map_is_readable_and_can_be_pulled() {
                 voxtile::Queries::occupancy_at(&here, point).unwrap()
             );
         }
-        // One voxel of each tile.
+        // The queries read one voxel of each tile, without loading whole tiles if the storage is compact.
         let io = there.statistics().io;
         assert_eq!((io.loads == 0, io.bytes_read > 0), (storage == Storage::Compact, true), "{io:?}");
         let disk = BucketDisk::open(bucket.clone()).unwrap().into_map_path();
@@ -107,7 +107,7 @@ fn a_push_sends_only_changes_and_readers_keep_their_state() {
     assert!(pruned.objects_pruned > 0);
     assert_eq!(server.objects().len() as u64, objects as u64 + pruned.objects_sent - pruned.objects_pruned);
     assert_eq!(digest_there(&bucket).unwrap(), digest(&map));
-    // Its state is gone, so it returns an error, never another state.
+    // The state of this reader was pruned, so it returns an error instead of another state.
     let error = reader.digest().unwrap_err();
     let message = format!("{:#}", anyhow::Error::from(error));
     assert!(message.contains("objects/") && message.contains("--prune"), "{message}");
@@ -161,15 +161,15 @@ fn diverged_copies_do_not_replace_each_other() {
     for copy in [&ours, &theirs] {
         pull(&bucket, copy, false, |_, _| {}).unwrap();
     }
-    go_on(&ours, 100, 2);
-    go_on(&theirs, 200, 5);
+    add_scans(&ours, 100, 2);
+    add_scans(&theirs, 200, 5);
     // A state that was never pushed is not replaced by an earlier state or one of another copy.
     push_now(&ours, &bucket);
     let (ours_pushed, theirs_now) = (digest(&ours), digest(&theirs));
     let refused = message_of(push(theirs.as_path(), &bucket, KEEP, |_, _| {}));
     assert!(refused.contains("voxtile merge") && refused.contains("--replace"), "{refused}");
     assert_eq!(digest_there(&bucket).unwrap(), ours_pushed);
-    go_on(&ours, 110, 5);
+    add_scans(&ours, 110, 5);
     push_now(&ours, &bucket);
     let refused = message_of(pull(&bucket, &theirs, true, |_, _| {}));
     assert!(refused.contains("voxtile merge") && refused.contains("theirs"), "{refused}");
@@ -178,10 +178,10 @@ fn diverged_copies_do_not_replace_each_other() {
     pull(&bucket, &map, true, |_, _| {}).unwrap();
     assert_eq!(digest(&map), digest(&ours));
     assert_whole(&map);
-    go_on(&map, 300, 1);
+    add_scans(&map, 300, 1);
     push_now(&map, &bucket);
     // --replace discards the remote state.
-    go_on(&theirs, 210, 20);
+    add_scans(&theirs, 210, 20);
     push(theirs.as_path(), &bucket, REPLACE, |_, _| {}).unwrap();
     assert_eq!(digest_there(&bucket).unwrap(), digest(&theirs));
 }
@@ -196,8 +196,8 @@ fn another_state_of_the_same_flush_is_refused() {
     drop(city(&map, Storage::OctoMap, false));
     push_now(&map, &bucket);
     pull(&bucket, &copy, false, |_, _| {}).unwrap();
-    go_on(&map, 100, 2);
-    go_on(&copy, 200, 2);
+    add_scans(&map, 100, 2);
+    add_scans(&copy, 200, 2);
     push_now(&map, &bucket);
     for at in [&map, &copy] {
         std::fs::remove_file(at.join("bucket_states")).unwrap();
@@ -205,7 +205,7 @@ fn another_state_of_the_same_flush_is_refused() {
     let refused = message_of(push(copy.as_path(), &bucket, KEEP, |_, _| {}));
     assert!(refused.contains("voxtile merge"), "{refused}");
     assert_eq!(push_now(&map, &bucket).objects_sent, 0);
-    go_on(&map, 110, 1);
+    add_scans(&map, 110, 1);
     push_now(&map, &bucket);
     assert_eq!(digest_there(&bucket).unwrap(), digest(&map));
 }
@@ -225,14 +225,14 @@ fn records_of_pushes_do_not_affect_the_map() {
         assert_whole(at);
     }
     // A push interrupted before it recorded its success recognises its own state in the bucket.
-    go_on(&map, 100, 1);
+    add_scans(&map, 100, 1);
     push_now(&map, &bucket);
     let path = map.join("bucket_states");
     let text = std::fs::read_to_string(&path).unwrap();
     let (before, last) = text.trim_end().rsplit_once('\n').unwrap();
     std::fs::write(&path, format!("{before}\n{}\n", last.replace("there", "offered"))).unwrap();
     pull(&bucket, &map, true, |_, _| {}).unwrap();
-    go_on(&map, 110, 1);
+    add_scans(&map, 110, 1);
     push_now(&map, &bucket);
 }
 
@@ -250,7 +250,7 @@ fn a_pull_does_not_reuse_damaged_files() {
     content[middle] ^= 1;
     std::fs::write(pulled.join(&name), content).unwrap();
     let again = pull(&bucket, &pulled, true, |_, _| {}).unwrap();
-    // That file, and the files that belong to no tile.
+    // Only the damaged file and the files that belong to no tile are fetched.
     assert!(again.files_fetched < again.files / 2, "{again:?}");
     assert_whole(&pulled);
     assert_eq!(digest(&pulled), digest(&map));
@@ -279,7 +279,7 @@ fn an_interrupted_pull_resumes() {
     let (map, pulled, bucket) = (folder.path().join("map"), folder.path().join("pulled"), server.bucket());
     drop(city(&map, Storage::Compact, false));
     push_now(&map, &bucket);
-    // An object that is read late is missing for now.
+    // Delete an object that a pull reads near its end, and restore it later.
     let manifest = server.get(&"maps/city/manifest.json".into());
     let manifest: serde_json::Value = serde_json::from_slice(&manifest).unwrap();
     let log = manifest["files"]["commits.log"]["parts"][0].as_str().unwrap();
@@ -292,7 +292,7 @@ fn an_interrupted_pull_resumes() {
     server.put(&key, content);
     let again = pull(&bucket, &pulled, false, |_, _| {}).unwrap();
     assert!(again.files_fetched < again.files / 2, "{again:?}");
-    // And the record of the pull.
+    // One more file than in the bucket: the record of the pull.
     assert_eq!(files_of(&pulled).len(), again.files as usize + 1);
     assert_eq!(digest(&pulled), digest(&map));
 }
@@ -370,7 +370,7 @@ fn missing_truncated_and_changed_objects_are_named() {
             }
             let name = key.filename().unwrap();
             match digest_there(&bucket) {
-                // Queries read no octrees and scans, and a manifest may end with a blank.
+                // Damage without effect: queries read neither octrees nor scans, and a manifest may end with a blank.
                 Ok(found) => assert_eq!(found, whole, "{key} {how}"),
                 Err(error) => {
                     refused += 1;
@@ -385,7 +385,7 @@ fn missing_truncated_and_changed_objects_are_named() {
                 let message = format!("{:#}", anyhow::Error::from(error));
                 assert!(message.contains(name) || message.contains("no map here"), "{key} {how}: {message}");
                 assert!(!pulled.exists());
-                // Otherwise it would not request the files that it already has.
+                // Remove the partial download, or the next pull would not request these files again.
                 let _ = std::fs::remove_dir_all(folder.path().join("pulled.unfinished"));
             }
             server.put(&key, content.clone());
@@ -415,7 +415,7 @@ fn a_hostile_manifest_writes_nothing_outside() {
     let text = String::from_utf8(server.get(&key)).unwrap();
     assert_eq!(with_checksum(&text), text.as_bytes());
     for path in ["../escaped", "/tmp/escaped", "a/../../escaped", "tile_0_0_0/../../escaped", "writer.lock"] {
-        // The files in a manifest are sorted.
+        // Replace an entry so that the files of the manifest remain sorted.
         let replaced = if path < "metadata.json" { "\"commits.log\"" } else { "\"scans.bin\"" };
         let hostile = text.replace(replaced, &format!("{path:?}"));
         assert_ne!(hostile, text);

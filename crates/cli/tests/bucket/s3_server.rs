@@ -163,7 +163,7 @@ impl State {
             blake3::hash(&self.objects.lock().unwrap().get(&request.key).cloned().unwrap_or_default());
         write!(
             stream,
-            "HTTP/1.1 {status} Told\r\nContent-Length: {}\r\nETag: \"{}\"\r\n{range}\
+            "HTTP/1.1 {status} Test\r\nContent-Length: {}\r\nETag: \"{}\"\r\n{range}\
              Last-Modified: Thu, 26 Nov 2026 09:00:00 GMT\r\nConnection: close\r\n\r\n",
             content.len(),
             e_tag.to_hex()

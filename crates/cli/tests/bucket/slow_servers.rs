@@ -132,7 +132,7 @@ fn a_third_of_the_connections_may_be_reset() {
 fn a_truncated_response_is_no_refusal() {
     let (server, folder) = (S3Server::new(), TempDir::new().unwrap());
     let map = a_map(&folder);
-    // The first response reports that there is no manifest yet.
+    // Truncate the first response, which reports that there is no manifest yet.
     server.trouble(|_, number| if number == 0 { Trouble::CutOff } else { Trouble::None });
     push_all(&server, &map);
     let [first, second] = [0, 1].map(|number| server.requests()[number].clone());
@@ -154,7 +154,8 @@ fn a_trickling_object_fails_and_a_slow_one_does_not() {
     );
     assert!(took < Duration::from_secs(20), "{took:?}");
 
-    // 200 kB at 8 kB every 20 ms, longer than the timeout; then content that stalls after half.
+    // The first response stalls after half of the content. The second sends the other 150 kB at 4 kB every 20 ms, which
+    // takes longer than the timeout.
     let place = TempDir::new().unwrap();
     let content: Vec<u8> = (0..300_000_u32).map(|at| ((at * 31) >> 7) as u8).collect();
     server.put("long.bin", content.clone());
@@ -183,7 +184,7 @@ fn a_manifest_with_a_lost_response_is_written_once() {
             let is_manifest = request.method == "PUT" && request.key.ends_with("manifest.json");
             if is_manifest && is_first.swap(false, Ordering::Relaxed) { lost } else { Trouble::None }
         });
-        crate::city::go_on(map.as_ref(), 100, 1);
+        crate::city::add_scans(map.as_ref(), 100, 1);
         let (pushed, _) = run(&server, &["push", &map, URL, "--bucket-timeout", "2"]);
         assert!(pushed.status.success(), "{:?}", texts(&pushed));
         server.trouble(|_, _| Trouble::None);
@@ -192,7 +193,7 @@ fn a_manifest_with_a_lost_response_is_written_once() {
     }
 }
 
-/// For commands with and without a signal handler, whatever the server does.
+/// Covers commands with and without a signal handler.
 #[cfg(unix)]
 #[test]
 fn a_signal_ends_a_command_waiting_for_a_bucket() {
@@ -237,7 +238,7 @@ fn a_signal_ends_a_command_waiting_for_a_bucket() {
     assert!(!folder.path().join("city.ply").exists() && !folder.path().join("built").exists());
 }
 
-/// A server that was never reached fails fast.
+/// A command fails fast if it never reached the server.
 #[test]
 fn a_wrong_address_fails_soon() {
     let closed = std::net::TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap();

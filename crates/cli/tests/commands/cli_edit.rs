@@ -88,7 +88,7 @@ fn a_part_is_cleared_in_place() {
     );
     assert_eq!(digest(map), digest(out));
     assert!(output(&["verify", map]).contains("intact"));
-    // New scans can map unknown voxels.
+    // New scans can map the cleared voxels again.
     let scans = folder.path().join("scans");
     output(&["build", text(&scans), "-o", map, "--append", "--again"]);
     assert_eq!(json(&["info", map, "--json"])["scan_number"].as_u64(), Some(6));

@@ -473,7 +473,7 @@ fn every_format_selects_the_same_voxels() {
         let reported = String::from_utf8_lossy(&output.stderr).into_owned();
         assert!(!output.status.success() && reported.contains(refused[2]), "{refused:?}: {reported}");
     }
-    // Squares are exact in single precision, even far from the origin.
+    // The autoware format supports --origin.
     let squares = path("squares");
     let output = run(&["-o", &squares, "--format", "autoware", "--origin", "10", "0", "0"]);
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
@@ -551,7 +551,7 @@ fn decayed_free_voxels_stay_free_in_files_from_above() {
     let map = near_map(&folder);
     let files = |when: &str| {
         ["pgm", "png", "glb"].map(|extension| {
-            // A file next to the picture contains its name.
+            // The name is the same before and after, because a file next to the picture contains it.
             let out = folder.path().join(when);
             fs::create_dir_all(&out).unwrap();
             let out = out.join(format!("map.{extension}"));

@@ -127,7 +127,7 @@ fn recordings_are_known_by_their_content() {
     }
 }
 
-/// Depth images without intrinsics.
+/// The error for depth images without intrinsics names the option and the default file.
 #[test]
 fn the_option_for_a_camera_is_named() {
     let (_outer, folder) = lone_folder();
@@ -136,7 +136,7 @@ fn the_option_for_a_camera_is_named() {
     assert!(refused.contains("--intrinsics FILE") && refused.contains("camera-intrinsics.txt"), "{refused}");
 }
 
-/// Transforms of a recording and poses of a file follow one rule.
+/// The rule is the same for transforms of a recording and for poses of a file.
 #[cfg(feature = "ros")]
 #[test]
 fn gaps_between_poses_are_filled_up_to_twice_the_tolerance() {
@@ -273,7 +273,7 @@ fn exports_are_atomic() {
     ] {
         output(&["export", &map, "-o", &place(name)]);
         assert!(fs::metadata(place(name)).unwrap().len() > 0, "{name}");
-        // Also over itself.
+        // An export may replace the output of an earlier one.
         output(&["export", &map, "-o", &place(name)]);
     }
     assert!(Path::new(&place("map.yaml")).exists() && Path::new(&place("map.pgw")).exists());
@@ -319,7 +319,7 @@ fn the_second_file_is_replaced_only_with_its_output() {
         (names(), fs::read(path("package.json")).unwrap()),
         (vec!["package.json".into()], b"{}".to_vec())
     );
-    // The last name is refused before the first is written.
+    // All output names are checked before the first file is written.
     fs::create_dir(path("h.pgw")).unwrap();
     let reported = refusal(&["export", &map, "-o", text(&path("h.png"))]);
     assert!(reported.contains("h.pgw"), "{reported}");
@@ -328,10 +328,10 @@ fn the_second_file_is_replaced_only_with_its_output() {
 
     output(&["export", &map, "-o", text(&path("h.png"))]);
     let written = fs::read(path("h.json")).unwrap();
-    // Leftover of a killed export.
+    // As after a killed export: the second file exists without its output.
     fs::remove_file(path("h.png")).unwrap();
     output(&["export", &map, "-o", text(&path("h.png"))]);
-    // From an earlier output.
+    // The second file of an earlier output is replaced.
     fs::write(path("h.json"), "{}").unwrap();
     output(&["export", &map, "-o", text(&path("h.png"))]);
     assert_eq!(fs::read(path("h.json")).unwrap(), written);
@@ -359,7 +359,7 @@ fn text_files_next_to_clouds_are_no_clouds() {
     }
 }
 
-/// Pose files in text format are among the clouds under any name.
+/// A text file of poses may have any name in the folder of clouds.
 #[test]
 fn a_file_of_poses_is_no_cloud() {
     let folder = tempfile::tempdir().unwrap();
@@ -466,7 +466,7 @@ fn coordinate_reference_systems_are_kept_and_written_back() {
     let (plain, other) = (path("plain"), path("other"));
     output(&["build", text(&points), "-o", text(&plain), "--no-rays", "--resolution", "0.5"]);
     assert!(!output(&["info", text(&plain)]).contains("crs"));
-    // The map has one, and so does the file.
+    // Add a coordinate reference system to the exported file.
     let named = path("named.las");
     output(&["export", text(&plain), "-o", text(&named), "-q"]);
     name_crs(&named, "EPSG:25832");
@@ -662,7 +662,7 @@ fn packed_recordings_are_unpacked_next_to_the_map() {
     fs::write(bag.join("a.mcap.zstd"), zstd::encode_all(plain.as_slice(), 3).unwrap()).unwrap();
     let metadata = "rosbag2_bagfile_information:\n  relative_file_paths:\n  - a.mcap.zstd\n";
     fs::write(bag.join("metadata.yaml"), metadata).unwrap();
-    // Its folder exists, its folder is created, or the map exists.
+    // Three cases: the folder of the map exists, the folder is created, the map exists.
     let maps = ["map", "new/folder/map", "map"].map(|map| folder.path().join(map));
     for (map, again) in maps.iter().zip([&[][..], &[], &["--append", "--again"]]) {
         let build = ["build", text(&bag), "--topic", "/points", "-o", text(map)];
@@ -694,7 +694,7 @@ fn a_recording_may_have_more_parts_than_files_may_be_open() {
     }
 }
 
-/// Pixels without depth are rays without a return, even if the range is from the map.
+/// Pixels without depth are rays without a return, even if the range of clearing is taken from the map.
 #[test]
 fn a_resumed_build_keeps_clearing_rays_without_a_return() {
     let folder = tempfile::tempdir().unwrap();
@@ -766,7 +766,7 @@ fn output_formats_are_the_same_in_help_pages_and_python() {
     let firsts = rows.iter().map(|row| row.split('|').nth(1).unwrap());
     for format in formats.all() {
         let word = format!("`{}`", end(format));
-        assert!(firsts.clone().any(|first| first.contains(&word)), "docs/formats.md says nothing of {word}");
+        assert!(firsts.clone().any(|first| first.contains(&word)), "docs/formats.md does not mention {word}");
     }
     let quoted =
         |names: Vec<String>| names.iter().map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", ");

@@ -104,7 +104,10 @@ fn a_failure_prints_an_object_and_a_line() {
 
     let (code, error, _) = failed(&["info", none, "--json"]);
     assert_eq!((code, &error["kind"], &error["path"]), (1, &"no_map".into(), &none.into()));
-    assert!(error.get("tile").is_none() && error.get("line").is_none(), "what does not apply is missing");
+    assert!(
+        error.get("tile").is_none() && error.get("line").is_none(),
+        "fields that do not apply are absent"
+    );
 
     let upside_down = ["clear", map, "--json", "--region", "0", "0", "0", "1", "1", "-1"];
     let (code, error, _) = failed(&upside_down);
@@ -132,7 +135,7 @@ fn a_failure_prints_an_object_and_a_line() {
         assert_eq!((run.status.code(), run.stdout.len()), (Some(code), 0), "{arguments:?}");
         assert!(!run.stderr.is_empty());
     }
-    // Standard output is the file.
+    // The exported file is on standard output, so the error object is on standard error.
     let no_map = &format!("{none}/no_map");
     let run = voxtile(&["export", no_map, "-o", "-", "--format", "csv", "--json"]).assert().failure();
     let run = run.get_output();

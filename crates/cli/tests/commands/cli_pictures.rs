@@ -72,7 +72,7 @@ fn changes_since_a_snapshot_are_drawn() {
     let (.., pixels) = pixels_of(&file);
     let count = |color: [u8; 3], pixels: &[[u8; 3]]| pixels.iter().filter(|&&pixel| pixel == color).count();
     use voxtile_render::colors::{APPEARED, SAME, VANISHED};
-    // The legend has a swatch of each color.
+    // The legend has a few pixels of each color.
     assert!(count(VANISHED, &pixels) > 10 * count(APPEARED, &pixels), "the cleared half of the wall");
     assert!(count(SAME, &pixels) > 10 * count(APPEARED, &pixels), "the other half");
     let snapshot = format!("{}@before", text(&map));

@@ -132,7 +132,7 @@ fn w_first_quaternions_are_detected_and_reported() {
 }
 
 #[test]
-fn a_calib_beside_poses_of_a_camera_is_named() {
+fn a_calib_file_next_to_camera_poses_is_suggested() {
     let folder = TempDir::new().unwrap();
     let scans = write_scans(folder.path(), &seen()[..3]);
     let poses = folder.path().join("poses.txt");
@@ -162,14 +162,14 @@ fn a_calib_beside_poses_of_a_camera_is_named() {
     assert!(reported.contains("these move along z") && !reported.contains("its z axis"), "{reported}");
     let reported = overview(&["--calib", text(&calib)]);
     assert!(!reported.contains("note"), "{reported}");
-    // Where nothing moves, it is not known.
+    // Poses without motion do not show the direction of travel.
     fs::write(&poses, along(2, 0.0)).unwrap();
     let reported = overview(&[]);
     assert!(reported.contains("add --calib") && !reported.contains("these move"), "{reported}");
     // Lidar poses move along x.
     fs::write(&poses, along(0, 1.0)).unwrap();
     assert!(!overview(&[]).contains("note"));
-    // With a calib that is not theirs, along -y.
+    // With a calib that does not belong to these poses, the sensor moves along -y.
     let reported = overview(&["--calib", text(&calib)]);
     assert!(reported.contains("with --calib the sensor moves along its -y axis"), "{reported}");
     fs::write(&poses, "1 0 0 0 0 -1 0 0 0 0 -1 0\n".repeat(3)).unwrap();

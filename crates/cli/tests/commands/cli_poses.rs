@@ -72,7 +72,7 @@ fn depth_images_of_7_scenes_use_the_poses_next_to_them() {
     assert_eq!(origins_m(&folder, &scans, &[]), [0.0]);
 }
 
-/// There are as many poses as files, but they begin later: a file has the pose at its time, not at its number.
+/// There are as many poses as files, but the poses begin later: a file has the pose at its time, not at its number.
 #[test]
 fn pcd_files_with_stamps_take_poses_by_time() {
     let folder = TempDir::new().unwrap();
@@ -118,7 +118,7 @@ fn pcd_files_accept_every_format_of_poses() {
     fs::write(&file, "1 five 0 0 0 0 0 1\n2 six 0 0 0 0 0 1\n").unwrap();
     let reported = refusal(&["build", text(&scans), "--poses", text(&file), "-o", text(&map)]);
     assert!(reported.contains("line 1") && reported.contains("`five` is not a number"), "{reported}");
-    // A file that is no scan is often first or last in the list.
+    // The error names the first and the last cloud, where a file that is no cloud often is.
     let three = "1 0 0 5\n0 1 0 0\n0 0 1 0\n0 0 0 1\n".repeat(3);
     fs::write(&file, three).unwrap();
     let reported = refusal(&["build", text(&scans), "--poses", text(&file), "-o", text(&map)]);

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use tempfile::TempDir;
 use voxtile::MapReader;
 
-/// A map of three kept scans, with the paths of both.
+/// A map that keeps three scans, and the folder from which it was built.
 struct Kept {
     folder: TempDir,
     scans: PathBuf,
@@ -26,7 +26,7 @@ impl Kept {
         text(&self.folder.path().join(name)).to_owned()
     }
 
-    /// Writes a file with the poses of the scans, moved by `by_m` more per scan.
+    /// Writes a file with the poses of the scans, where scan `k` is moved by `k * by_m`.
     fn poses(&self, name: &str, by_m: f64) -> String {
         let path = self.path(name);
         let own = fs::read_to_string(self.scans.join("poses_kitti.txt")).unwrap();
@@ -73,10 +73,10 @@ fn a_remapped_map_equals_a_build_with_the_new_poses() {
     assert_eq!(digest(&kept.map), kept.digest_with(&moved, "again"));
     assert_eq!(digest(&format!("{}@before", kept.map)), before);
     assert!(output(&["verify", &kept.map]).contains("intact"));
-    // A build resumes with them, and no scan counts twice.
+    // A build with the new poses resumes, and no scan counts twice.
     let resume = ["build", text(&kept.scans), "-o", &kept.map, "--poses", &moved, "--resume", "--json"];
     assert_eq!(json(&resume)["resumed_after"], 3);
-    // Back again; one of the moves is within the tolerance.
+    // Move the scans back. One of the two moves is within the tolerance, so this scan stays.
     let own = kept.poses("own.txt", 0.0);
     let reported = output(&["remap", &kept.map, "--poses", &own, "--tolerance", "0.4m,1deg"]);
     assert!(
@@ -193,7 +193,7 @@ fn impossible_replays_are_refused_with_a_remedy() {
     assert!(message.contains("a change by another operation: clear"), "{message}");
 }
 
-/// As with new poses in place, another map needs all scans.
+/// A map built with -o needs all scans, like new poses in place.
 #[test]
 fn another_map_is_refused_if_scans_are_not_kept() {
     let kept = Kept::new();
@@ -279,7 +279,7 @@ fn an_invalid_tolerance_is_refused() {
     }
 }
 
-/// Unordered lines match scans by stamps; without stamps of scans their order is ambiguous.
+/// Poses that are not in time order are matched to scans by time stamp, and refused if the scans have no stamps.
 #[test]
 fn unordered_poses_are_not_matched_by_line() {
     let kept = Kept::new();

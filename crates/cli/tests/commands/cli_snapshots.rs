@@ -103,7 +103,7 @@ fn wrong_snapshot_names_are_reported() {
     let (code, printed) = failure(&["diff", map, text(&other)]);
     assert_eq!(code, 2);
     assert!(printed.contains("resolution 0.2 m, not 0.1 m"), "{printed}");
-    // A folder of that name has precedence.
+    // A folder named `odd@a` takes precedence over a snapshot `a` of the map `odd`.
     let odd = folder.path().join("odd@a");
     fs::rename(text(&other), &odd).unwrap();
     assert_eq!(json(&["info", text(&odd), "--json"])["resolution_m"], 0.2);

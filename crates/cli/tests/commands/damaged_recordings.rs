@@ -12,8 +12,8 @@ fn sized(bytes: &[u8]) -> Vec<u8> {
     [&(bytes.len() as u32).to_le_bytes()[..], bytes].concat()
 }
 
-/// Returns an unfinished MCAP file of chunks with a checksum and a number of clouds. A checksum of 0 means none, any
-/// other is wrong.
+/// Returns an unfinished MCAP file. Each chunk is given by a checksum and a number of clouds. The checksum 0 means no
+/// checksum, any other is wrong.
 fn recording(chunks: &[(u32, u32)]) -> Vec<u8> {
     let schema =
         [&1_u16.to_le_bytes()[..], &sized(b"sensor_msgs/msg/PointCloud2"), &sized(b"ros2msg"), &sized(b"")];

@@ -23,7 +23,7 @@ fn a_resumed_build_adds_every_scan_once_and_refuses_other_input() {
     let build = |map, more: &[&str]| json(&[&["build", scans, "-o", map, "--json"], more].concat());
     let parameters = ["--resolution", "0.2", "--max-range", "9", "--insert", "per-ray"];
     build(whole, &parameters);
-    // Started with --resume; after the end nothing is left to do, with or without the parameters.
+    // The first build starts with --resume. Later ones add nothing, with or without the parameters.
     let begun = build(map, &[&["--resume", "--flush-every", "1"], &parameters[..]].concat());
     assert_eq!((&begun["scans"], &begun["resumed_after"]), (&3.into(), &0.into()));
     for parameters in [&parameters[..], &[]] {
@@ -55,7 +55,7 @@ fn a_resumed_build_adds_every_scan_once_and_refuses_other_input() {
         assert!(code == 2 && stderr.contains(message), "{arguments:?}: {code}: {stderr}");
         assert_eq!(stderr.lines().count(), 1, "{stderr}");
     }
-    assert_eq!(digest(map), digest(whole), "what is refused changes nothing");
+    assert_eq!(digest(map), digest(whole), "a refused build does not change the map");
 }
 
 /// Writes scans at different x, in metres, that differ between seeds.
@@ -251,7 +251,7 @@ fn damage_is_reported_with_an_exit_code_and_repaired() {
     assert_eq!(code, 1);
     assert!(stdout.contains(&format!("{}: tile (", octree.display())), "{stdout}");
     assert!(stdout.contains(&format!("offset {at}: ")), "{stdout}");
-    assert_eq!(digest(map), before, "the table is the truth");
+    assert_eq!(digest(map), before, "the digest does not depend on the octree");
     assert!(output(&["repair", map]).contains("derived: "));
     assert_eq!(fs::read(&octree).unwrap(), bytes);
 
@@ -277,7 +277,7 @@ fn damage_is_reported_with_an_exit_code_and_repaired() {
 }
 
 #[test]
-fn a_map_of_the_seeds_own_format_is_unverified_and_not_damaged() {
+fn a_map_of_the_original_format_is_unverified_and_not_damaged() {
     let folder = TempDir::new().unwrap();
     let input = scans(&folder);
     let path = folder.path().join("map");
@@ -432,7 +432,8 @@ fn an_input_of_only_empty_scans_is_resumed() {
     output(&["build", input, "-o", text(&whole)]);
     assert_eq!(digest(map), digest(text(&whole)));
 
-    // One of the empty scans is skipped; a later attempt that adds nothing still reports them.
+    // One of the empty scans has an invalid pose and is skipped. A later build that adds no scan does not change where
+    // the input resumes.
     let first = Path::new(input).join("scan0.pcd");
     let far = fs::read_to_string(&first).unwrap().replacen("VIEWPOINT 0 ", "VIEWPOINT 1e12 ", 1);
     fs::write(&first, far).unwrap();

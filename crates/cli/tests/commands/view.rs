@@ -280,7 +280,7 @@ fn another_octomap_file_has_other_nodes() {
 }
 
 #[test]
-fn strangers_get_nothing() {
+fn unauthorised_requests_get_nothing() {
     let (folder, map) = a_map();
     let secret = folder.path().join("secret.txt");
     fs::write(&secret, "secret").unwrap();
@@ -322,7 +322,7 @@ fn strangers_get_nothing() {
     for method in ["POST", "PUT", "DELETE", "OPTIONS", "PATCH"] {
         assert_eq!(reply_to(&format!("{method} /{TOKEN}/maps.json HTTP/1.1"), &host).status, 405, "{method}");
     }
-    // A page of another site with a DNS name for this machine.
+    // DNS rebinding: a page of another site reaches this server by a name of its own.
     for name in ["elsewhere.example", "elsewhere.example:80", "", "127.0.0.1.elsewhere.example"] {
         assert_eq!(reply_to(&format!("GET /{TOKEN}/maps.json HTTP/1.1"), name).status, 403, "{name}");
     }
@@ -448,7 +448,7 @@ fn snapshots_and_changes_since_them_are_shown() {
     assert!([1, 2, 3].iter().all(|value| wanted.iter().any(|(_, found)| found == value)));
     assert_eq!(change, wanted);
     assert_eq!(viewer.get("maps/0@tuesday/tileset.json").status, 404);
-    // Only a snapshot.
+    // Show a snapshot without its map.
     let path = PathBuf::from(format!("{}@monday", map.display()));
     let viewer = Viewer::ready(&[&path], &folder.path().join("cache"));
     assert_eq!(viewer.finest("0").into_iter().map(|(voxel, _)| voxel).collect::<BTreeSet<_>>(), before);
@@ -528,7 +528,7 @@ fn the_cache_is_reused_and_its_damage_has_no_effect() {
         let (one, other) = (Viewer::ready(&[&map], &cache), Viewer::ready(&[&map], &cache));
         assert_eq!((shown(&one), shown(&other)), (wanted.clone(), wanted.clone()));
     }
-    assert_eq!(fs::read(&kept).unwrap(), bytes, "it was made again");
+    assert_eq!(fs::read(&kept).unwrap(), bytes, "the cache file must not change");
     for damaged in
         [bytes[..bytes.len() / 2].to_vec(), bytes.iter().map(|byte| byte ^ 0x20).collect(), Vec::new()]
     {
@@ -602,7 +602,7 @@ fn event_streams_and_silent_connections_block_no_client() {
     let begun = Instant::now();
     let mut open: Vec<TcpStream> = (0..520).map(|_| ask("events")).collect();
     assert_eq!(viewer.get("maps.json").status, 200);
-    // The newest ones continue.
+    // The newest event streams remain open.
     assert_eq!(open[519].peek(&mut [0; 12]).unwrap(), 12);
     open.extend((0..520).map(|_| ask("page.js")));
     open.extend((0..520).map(|_| viewer.connect()));

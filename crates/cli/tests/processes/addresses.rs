@@ -81,7 +81,7 @@ fn falling_limits(seed: u64) -> impl Iterator<Item = u64> {
 fn run(command: &Command, limit_kib: u64, stdin: Stdio) -> Output {
     let mut command = limited(command, 'v', limit_kib);
     let mut child = command.stdin(stdin).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
-    wait_until("a process without addresses ends", || child.try_wait().unwrap().is_some());
+    wait_until("a process with limited address space ends", || child.try_wait().unwrap().is_some());
     let output = child.wait_with_output().unwrap();
     let printed = printed(&output);
     let is_panic =
@@ -131,7 +131,7 @@ fn a_build_with_failing_allocations_keeps_its_flushes_and_resumes() {
         for limit_kib in falling_limits(seed) {
             (_, between_kib) = try_with(limit_kib);
         }
-        // Builds that end early are between these limits, in a range that may be small.
+        // Search for limits at which builds end early: they are between these two, in a range that may be small.
         for _ in 0..8 {
             match try_with(between_kib) {
                 (0, next_kib) => between_kib = next_kib,
@@ -140,9 +140,9 @@ fn a_build_with_failing_allocations_keeps_its_flushes_and_resumes() {
         }
         assert!(
             whole > 0 && cut > 0 && in_vain > 0,
-            "{storage}: {whole} whole, {cut} cut, {in_vain} in vain"
+            "{storage}: {whole} whole, {cut} ended early, {in_vain} without a map"
         );
-        println!("{storage}: {whole} whole, {cut} cut short, {in_vain} before there was a map");
+        println!("{storage}: {whole} whole, {cut} ended early, {in_vain} without a map");
     }
 }
 
@@ -165,7 +165,7 @@ fn scans_of_build(drive: &Drive, map: &Path, storage: &str, limit_kib: u64) -> O
 
 /// Out of memory is never reported as damage, and repair removes only damaged data.
 #[test]
-fn verify_and_repair_with_failing_allocations_report_and_change_nothing_wrong() {
+fn verify_and_repair_report_no_false_damage_if_allocations_fail() {
     let drive = Drive::new();
     for (seed, storage) in (10..).zip(["octomap", "compact"]) {
         let (_folder, map) = folder_for_maps();

@@ -73,14 +73,14 @@ fn a_removal_killed_after_its_commit_is_completed_by_the_same_command() {
         let reported = String::from_utf8_lossy(&output.stdout).into_owned();
         assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
         assert!(reported.contains("completed") || reported.contains("2 scans removed"), "{reported}");
-        assert!(!first(&map).exists(), "the points are still there");
+        assert!(!first(&map).exists(), "the removed points are still on disk");
         assert!(!answer(&["verify", text]).contains("leftovers"));
         return;
     }
     panic!("the command was faster than the kill, 20 times");
 }
 
-/// Killed between its snapshot and its commit.
+/// The command is killed between its snapshot and its commit.
 #[test]
 fn a_removal_killed_after_its_snapshot_is_completed_by_the_same_command() {
     let scans = Scans::new(12, 1);

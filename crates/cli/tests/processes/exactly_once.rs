@@ -26,7 +26,7 @@ fn a_repeated_command_adds_every_scan_of_every_input_once() {
     build.kill();
     assert_eq!(flushed_scans(&map), Some(12));
 
-    // Then twice after it: the scans of the first flush are skipped.
+    // Then killed twice after a flush: the flushed scans are skipped.
     for flushed in [3, 6] {
         let mut build = StreamedBuild::spawn(&map, &[&HOW[..], &["--flush-every", "3"]].concat());
         build.write(&second[..flushed + 1]);

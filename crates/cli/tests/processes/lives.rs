@@ -16,7 +16,8 @@ struct Expected {
     snapshots: BTreeMap<&'static str, usize>,
 }
 
-/// One map over its lifetime. After a kill its state is that before or after the command, or in between for a build.
+/// One map over its lifetime. A killed command leaves the map in its state before or after the command; a killed build
+/// may also leave a state in between.
 struct Life<'a> {
     scans: &'a Scans,
     map: PathBuf,
@@ -42,7 +43,7 @@ impl Life<'_> {
         false
     }
 
-    /// Adds the scans once more, with random options that do not change the map.
+    /// Adds the scans once more, with random options that do not affect the resulting map.
     fn build(&mut self) {
         let from = self.expected.scans;
         let mut how = vec!["--append", "--again"];
@@ -153,7 +154,7 @@ fn a_map_has_the_expected_state_after_random_commands_kills_and_reads() {
                 voxtile().arg("digest").arg(&map).arg("--json").stdout(Stdio::piped()).spawn().unwrap();
             life.step();
             let answer = reader.wait_with_output().unwrap();
-            assert!(answer.status.success(), "{}: a reader beside it", life.what);
+            assert!(answer.status.success(), "{}: a concurrent reader failed", life.what);
             let answer: serde_json::Value = serde_json::from_slice(&answer.stdout).unwrap();
             let number = answer["scan_number"].as_u64().unwrap() as usize;
             assert_eq!(answer["digest"], scans.digests[number].as_str(), "{}", life.what);

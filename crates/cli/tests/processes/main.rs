@@ -19,11 +19,11 @@ mod exactly_once;
 mod killed;
 /// Random lifetimes of maps: commands, kills and readers, compared with an expected state.
 mod lives;
-/// Memory of a command, as it reports it.
+/// Peak memory of commands, from their JSON.
 mod memory;
 /// Killed merges leave no map or a complete one.
 mod merged;
-/// The thread that writes octrees is the only one, sleeps when idle and ends with its mapper.
+/// One thread writes all octrees; it sleeps when idle and ends with its mapper.
 #[cfg(target_os = "linux")]
 mod octree_worker;
 mod random;

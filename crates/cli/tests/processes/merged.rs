@@ -28,7 +28,7 @@ fn a_killed_merge_leaves_no_map_and_succeeds_later() {
     let (mut killed, mut ended) = (0, 0);
     while killed < kills {
         let mut child = merge([&a, &b], &output).spawn().unwrap();
-        // Evenly over the duration of a merge and a little longer.
+        // Spread the kills evenly over the duration of a merge and a little longer.
         sleep(Duration::from_micros(whole_us * ((killed + ended) * 7 % 24) / 20));
         child.kill().unwrap();
         let run = child.wait_with_output().unwrap();
@@ -47,7 +47,7 @@ fn a_killed_merge_leaves_no_map_and_succeeds_later() {
             }
             Err(message) => assert!(message.contains("no map here"), "{message}"),
         }
-        assert!(ended < 20 * kills, "it is never caught at work");
+        assert!(ended < 20 * kills, "every merge ended before its kill");
     }
     let last = merge([&a, &b], &output).output().unwrap();
     assert!(last.status.success(), "{}", String::from_utf8_lossy(&last.stderr));

@@ -29,7 +29,7 @@ fn readers_see_only_digests_of_flushes() {
                 scope.spawn(|| {
                     let mut seen = Vec::new();
                     while !done.load(Ordering::Relaxed) {
-                        let answer = digest(&map).expect("a reader is never disturbed");
+                        let answer = digest(&map).expect("a reader succeeds while a writer flushes");
                         different.lock().unwrap().insert(answer.0);
                         seen.push(answer);
                     }
@@ -55,11 +55,12 @@ fn readers_see_only_digests_of_flushes() {
     }
     let different = different.into_inner().unwrap();
     println!("{} answers of {} flushes while {flushed} were made", seen.len(), different.len());
-    assert!(different.len() > 3, "the readers did not read beside the writer");
+    assert!(different.len() > 3, "the readers saw too few flushes of the writer");
     assert!(is_whole(&map));
 }
 
-/// A list of scans is read while a writer flushes and removes unread files: it is read again, but printed once.
+/// While a command reads the list of scans, a writer flushes and removes files. The command reads the list again, but
+/// prints it once.
 #[test]
 fn a_retried_list_of_scans_is_printed_once() {
     const COUNT: u64 = 3000;
@@ -82,7 +83,7 @@ fn a_retried_list_of_scans_is_printed_once() {
     let kept = std::fs::read_dir(map.join("kept_scans")).unwrap().map(|entry| entry.unwrap().path());
     let catalog = kept.filter(|path| path.to_str().unwrap().contains("catalog")).min().unwrap();
     let half = std::fs::metadata(&catalog).unwrap().len() / 2;
-    assert!(half > 1 << 16, "all of it was read at once");
+    assert!(half > 1 << 16, "the list must be longer than a read buffer");
     std::fs::OpenOptions::new().write(true).open(&catalog).unwrap().set_len(half).unwrap();
     let rows =
         first.into_iter().chain(lines).map(|line| serde_json::from_str::<Value>(&line.unwrap()).unwrap());

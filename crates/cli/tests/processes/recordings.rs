@@ -7,7 +7,7 @@ use std::process::Command;
 
 const MEMORY: u64 = 64 << 20;
 /// Memory of a process in addition to its budget, in bytes.
-const BESIDE: u64 = 48 << 20;
+const OVERHEAD: u64 = 48 << 20;
 /// More than budget and overhead together.
 const LARGE_BYTES: usize = 120 << 20;
 const STAMP_S: u32 = 1_700_000_000;
@@ -28,7 +28,7 @@ fn keeps_to_its_memory(input: &Path, how: &[&str]) -> String {
     assert!(output.status.success(), "{name}: {}", String::from_utf8_lossy(&output.stderr));
     let built: Value = serde_json::from_slice(&output.stdout).unwrap();
     let peak = built["peak_rss_bytes"].as_u64().expect("this system reports the peak");
-    assert!(peak < MEMORY + BESIDE, "{name}: {} MiB", peak >> 20);
+    assert!(peak < MEMORY + OVERHEAD, "{name}: {} MiB", peak >> 20);
     assert_eq!(built["scans"], 1, "{name}: {built}");
     digest(&map).unwrap().1
 }
@@ -151,7 +151,7 @@ fn mcap(messages: &[(u32, Vec<u8>)]) -> Vec<u8> {
     [b"\x89MCAP0\r\n".to_vec(), header, mcap_record(6, &contents)].concat()
 }
 
-/// A message next to the cloud that is tiny when compressed.
+/// The chunk has a large message that is tiny when compressed.
 #[test]
 fn a_packed_chunk_keeps_to_the_memory() {
     let (folder, _) = folder_for_maps();
@@ -178,7 +178,7 @@ fn many_transforms_are_sorted_in_a_file() {
     let path = folder.path().join("a.bag");
     let message = transforms(100_000);
     let mut messages: Vec<(u32, Vec<u8>)> = (0..8).map(|_| (1, message.clone())).collect();
-    // Each with its own stamp, a hundred seconds later.
+    // Each message has its own stamp, 100 s after that of the previous one.
     for (number, (_, message)) in messages.iter_mut().enumerate().skip(1) {
         for transform in message[4..].chunks_exact_mut(84) {
             transform[4..8].copy_from_slice(&(STAMP_S + 100 * number as u32).to_le_bytes());

@@ -31,9 +31,9 @@ fn a_signal_ends_a_build_with_all_its_scans_in_the_map() {
             assert_eq!(message.lines().count(), 2, "{message}");
             assert!(message.contains("a second Ctrl-C or SIGTERM"), "{message}");
             let (number, seen) = digest(&map).unwrap_or((0, scans.digests[0].clone()));
-            let is_told = message.contains(&format!("stopped after {number} scan"))
+            let is_reported = message.contains(&format!("stopped after {number} scan"))
                 || (message.contains("stopped before the first scan"));
-            assert!(is_told, "{message}");
+            assert!(is_reported, "{message}");
             assert_eq!(seen, scans.digests[number]);
             stopped += 1;
         }
@@ -48,7 +48,7 @@ fn read_until(child: &mut Child, text: &str) -> BufReader<impl Read + use<>> {
     let mut line = String::new();
     while !line.contains(text) {
         line.clear();
-        assert!(lines.read_line(&mut line).unwrap() > 0, "it ended without saying `{text}`");
+        assert!(lines.read_line(&mut line).unwrap() > 0, "it ended without printing `{text}`");
     }
     lines
 }

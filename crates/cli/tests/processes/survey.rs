@@ -12,7 +12,7 @@ use voxtile_simulation::{City, Drive, Lidar, Survey};
 pub struct Scans {
     pub folder: TempDir,
     pub digests: Vec<String>,
-    /// Parent folder of its own, so that poses among other temporary files are not found.
+    /// Parent of `folder`. Builds also look for poses next to their input, where other tests may have files.
     _around: TempDir,
 }
 
@@ -20,7 +20,8 @@ pub const RESOLUTION_M: f64 = 0.5;
 const MAX_RANGE_M: f64 = 20.0;
 
 impl Scans {
-    /// Writes `count` scans of a drive through a synthetic city. Each build inserts all of them `rounds` times.
+    /// Writes `count` scans of a drive through a synthetic city. Also computes the digests of a build that inserts all
+    /// of them `rounds` times.
     pub fn new(count: usize, rounds: usize) -> Self {
         let around = TempDir::new().unwrap();
         let folder = TempDir::new_in(around.path()).unwrap();

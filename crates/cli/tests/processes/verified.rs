@@ -21,7 +21,7 @@ fn run(arguments: &[&str]) {
     assert!(output.status.success(), "{arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
 }
 
-/// Returns the damage that a verification finds, and the number of unsettled places.
+/// Returns the damage that a verification finds, and the number of places that it could not decide.
 fn damage_in(map: &Path) -> (Vec<String>, u64) {
     let mut damage = Vec::new();
     let note = |finding: &Finding| {

@@ -40,7 +40,7 @@ pub(super) fn starts_with_number(line: &str) -> bool {
     first.is_none_or(|word| separator.number(word).is_some())
 }
 
-/// Combines a column of whole seconds and a column of nanoseconds.
+/// Combines a column of whole seconds and a column of nanoseconds to a stamp.
 pub(super) fn stamp_of_two(cells: &Cells<'_>, seconds: usize, nanoseconds: usize) -> Stamp {
     let whole = |at: usize| cells.words.get(at).and_then(|word| stamp_of(word, 0));
     let (Some(seconds), Some(nanoseconds @ 0..1_000_000_000)) = (whole(seconds), whole(nanoseconds)) else {

@@ -4,6 +4,6 @@ pub fn most_gap_ns(tolerance_ns: i64) -> i64 {
     tolerance_ns.max(0).saturating_mul(2)
 }
 
-/// A pose this close to a scan in time is used whatever the distance to the next pose is: programs round stamps, and
-/// key frames have large gaps.
+/// Maximum time between a scan and a pose that is used even if the next pose is far away in time: programs round
+/// stamps, and key frames have large gaps.
 pub(crate) const SAME_TIME_NS: u64 = 1_000_000;

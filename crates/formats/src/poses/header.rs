@@ -15,7 +15,7 @@ pub(super) struct Roles {
 /// Columns that hold the time stamp.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum TimeColumns {
-    /// One column. The second value is the number of decimal digits between its unit and a nanosecond, if the column
+    /// One column. The second value is the power of ten from its unit to nanoseconds (9 for seconds), if the column
     /// name states the unit.
     One(usize, Option<i32>),
     /// Whole seconds in one column and the remaining nanoseconds in another.

@@ -35,7 +35,7 @@ pub(super) struct BadRow {
 /// Kind of an invalid row.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum BadKind {
-    /// Numbers are missing, NaN or infinite: the program that wrote the file lost track.
+    /// A lost pose: numbers are missing, NaN or infinite, for example because the tracking of the sensor failed.
     Lost,
     /// A row or pose of another layout. If most rows are like this, the file is not a pose file.
     Odd,
@@ -83,7 +83,7 @@ pub(super) struct Stamps {
 
 /// Poses of a file, by row number and by time.
 pub(super) struct PoseLists {
-    /// In file order. Lost poses keep their positions.
+    /// Poses in file order, including lost ones, so that the index is the row number.
     pub(super) poses: PoseList,
     /// Sorted by strictly increasing time, without lost poses; `None` if `poses` is already so.
     pub(super) by_time: Option<PoseList>,

@@ -252,7 +252,7 @@ impl PosedClouds {
                         .flatten();
                     return points.push(far.unwrap_or([f64::NAN; 3]), intensity);
                 }
-                // Dropped later as a point without a return.
+                // Move the point to the sensor position, so that it is dropped later.
                 false => origin,
             };
             let in_sensor: Point = std::array::from_fn(|k| place[k] - origin[k]);
@@ -285,7 +285,7 @@ fn body_at(
     }
 }
 
-/// Explains why a stamp has no pose: `later_ns - earlier_ns` is the distance to the trajectory.
+/// Explains why a stamp has no pose: the trajectory begins or ends `later_ns - earlier_ns` away from it.
 fn outside(later_ns: i64, earlier_ns: i64, place: &str) -> String {
     /// Offsets between common clocks, in seconds: GPS and Unix time, and the adjusted standard GPS time of LAS.
     const CLOCKS_S: [f64; 3] = [315_964_800.0, 1e9, 1e9 + 315_964_800.0];

@@ -1,7 +1,7 @@
 //! Detection of the order of quaternion components, w first or w last, where no column name states it.
 
-/// Evidence for either order. Both have unit length and equal turns between poses; but only in the correct order does
-/// the sensor start upright and turn about the vertical.
+/// Evidence for the order of the components. In both orders, the quaternions have unit length and the same angles
+/// between poses. Only in the correct order does the sensor start upright and turn about the vertical.
 #[derive(Clone, Debug, Default)]
 pub(super) struct OrderEvidence {
     /// First quaternion, as stored in the file.
@@ -89,7 +89,7 @@ mod tests {
 
     type Rotation = UnitQuaternion<f64>;
 
-    /// Returns the detected result (w first) for poses written with w first, and for poses written with w last.
+    /// Returns whether w first is detected: for rotations written with w first, and for the same written with w last.
     fn found(rotations: &[Rotation]) -> [bool; 2] {
         [true, false].map(|is_first| {
             let mut evidence = OrderEvidence::default();

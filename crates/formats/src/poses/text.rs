@@ -126,7 +126,7 @@ struct TextPoses {
     has_header: bool,
     /// Whether all lines so far have the plain form.
     are_plain: bool,
-    /// Decimal digits between the unit of time and a nanosecond.
+    /// Power of ten from the unit of time to nanoseconds: 9 for seconds.
     digits: Option<i32>,
     /// Numbers of an incomplete matrix; NaN for unreadable ones.
     matrix: Vec<f64>,
@@ -263,7 +263,7 @@ impl TextPoses {
             && !(matches!(layout, Layout::Matrix { .. }) && found == columns + 4)
         {
             let reason = format!("{found} numbers, but the lines before have {columns}");
-            // A truncated row was lost.
+            // A row with too few numbers counts as a lost pose.
             let kind = if found < columns { BadKind::Lost } else { BadKind::Odd };
             let has_time = matches!(layout, Layout::Tum | Layout::Matrix { has_time: true });
             let stamp = if has_time { self.stamp(cells, 0, None) } else { Stamp::None };
@@ -381,7 +381,7 @@ fn other_count(numbers: usize) -> String {
 fn pose_of(numbers: &[f64], rules: Rules) -> Result<RigidPose, (BadKind, String)> {
     let &[x, y, z, qx, qy, qz, qw] = numbers else { return Err((BadKind::Odd, "no pose".into())) };
     pose([x, y, z, qx, qy, qz, qw], rules).map_err(|reason| {
-        // Some programs write zeros where they lost track.
+        // Some programs write zeros while tracking is lost.
         let is_zero = [qx, qy, qz, qw] == [0.0; 4];
         (if is_zero { BadKind::Lost } else { BadKind::Odd }, reason)
     })

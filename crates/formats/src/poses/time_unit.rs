@@ -1,9 +1,9 @@
 use crate::read::stamp;
 
-/// Decimal digits between a second and a nanosecond.
+/// Power of ten from seconds to nanoseconds.
 pub(super) const SECONDS: i32 = 9;
 
-/// Guesses the unit of a time from its magnitude. Returns the decimal digits between the unit and a nanosecond.
+/// Guesses the unit of a time from its magnitude. Returns the power of ten from the unit to nanoseconds: 9 for seconds.
 pub(super) fn digits_of(word: &str) -> Option<i32> {
     let value: f64 = word.parse().ok()?;
     value.is_finite().then(|| digits_of_value(value))
@@ -11,7 +11,7 @@ pub(super) fn digits_of(word: &str) -> Option<i32> {
 
 /// As [`digits_of`], for a number.
 pub(super) fn digits_of_value(value: f64) -> i32 {
-    // A hundred billion seconds are 3000 years.
+    // A hundred billion seconds are 3000 years, so larger values are in smaller units.
     match value.abs() {
         large if large >= 1e17 => 0,
         large if large >= 1e14 => 3,

@@ -15,7 +15,7 @@ use voxtile::{Error, Result};
 #[derive(Clone, Debug, Default)]
 pub struct Trajectory {
     path: PathBuf,
-    /// In file order. Lost poses keep their positions.
+    /// Poses in file order, including lost ones (rows with invalid numbers), so that the index is the row number.
     poses: PoseList,
     /// Sorted by strictly increasing time, without lost poses; `None` if `poses` is already so.
     by_time: Option<PoseList>,
@@ -145,8 +145,8 @@ impl Trajectory {
     }
 
     /// Returns the pose at a time. Between two poses it is interpolated if they are at most twice the tolerance apart
-    /// (see [`most_gap_ns`]). Poses are never extrapolated: otherwise a pose is used only within one millisecond, which
-    /// covers rounding of stamps.
+    /// (see [`most_gap_ns`]). Poses are never extrapolated: in larger gaps, before the first and after the last pose,
+    /// only a pose within one millisecond is used, which covers rounding of stamps.
     ///
     /// # Errors
     ///
@@ -282,13 +282,13 @@ impl Trajectory {
         let Some(clouds) = source.len_hint().filter(|clouds| *clouds != self.len() as u64) else {
             return Ok(());
         };
-        // A file that is not a cloud is often the first or last of the list.
+        // Name the first and the last cloud, because a file that is not a cloud is often one of them.
         let named = source.ends().map(|[first, last]| format!(" ({first} to {last})")).unwrap_or_default();
         Err(self.other_number(&format!("{clouds} clouds{named}")))
     }
 
-    /// Checks that the poses can be matched by number, for clouds without time stamps. Stamps that go back show that
-    /// the lines are in another order than the clouds.
+    /// Checks that the poses can be matched by number, for clouds without time stamps. If the stamps do not ascend, the
+    /// lines are in another order than the clouds.
     ///
     /// # Errors
     ///

@@ -14,7 +14,7 @@ const KITTI: [&str; 4] = ["x", "y", "z", "intensity"];
 const NUSCENES: [&str; 5] = ["x", "y", "z", "intensity", "ring"];
 /// Number of bytes used to guess the columns: a whole number of points of three to eight floats or doubles.
 const GLANCE_BYTES: u64 = 3 * 840 * 8;
-/// Up to this many points do not give enough evidence for the columns.
+/// Minimum number of points from which the columns can be concluded.
 const FEW_POINTS: usize = 16;
 /// Limit well above the number of columns of any sensor.
 const MAX_FIELDS: usize = 256;
@@ -52,7 +52,7 @@ impl Columns {
         columns
     }
 
-    /// Builds the known columns of a reading: x y z, and intensity if there are four.
+    /// Returns the known columns of an interpretation: x y z, and intensity if there are four columns.
     fn of_reading(reading: Reading) -> Self {
         let mut names: Vec<String> =
             KITTI.iter().take(reading.columns).map(|name| (*name).to_owned()).collect();
@@ -185,7 +185,7 @@ fn guess(path: &Path, is_nuscenes: bool, start: &[u8], bytes: u64) -> Result<Col
     }
 }
 
-/// Suggests column names for a reading, for messages.
+/// Suggests column names for an interpretation, for messages.
 fn example(reading: Reading) -> String {
     let kind = if reading.kind == Scalar::F64 { ":f64" } else { "" };
     let names = NUSCENES.map(str::to_owned).into_iter().chain((6..).map(|number| format!("column{number}")));
@@ -202,8 +202,9 @@ fn describe(columns: &Columns) -> String {
     format!("{count} columns of {}: {}{rest}", if is_wide { "float64" } else { "float32" }, known.join(" "))
 }
 
-/// Returns whether the fifth of five columns is a ring and the data is not four columns with intensity. With a wrong
-/// column count, the last column contains coordinates, which are not all whole numbers.
+/// Returns whether the fifth of five columns looks like the ring numbers of a lidar, and the fourth of four columns
+/// does not look like intensities. With a wrong column count, the last column contains coordinates, which are not all
+/// whole numbers.
 fn looks_like_nuscenes(start: &[u8]) -> bool {
     let floats: Vec<f32> = start.as_chunks().0.iter().map(|bytes| f32::from_le_bytes(*bytes)).collect();
     let last_of = |columns: usize| floats.iter().skip(columns - 1).step_by(columns).copied();

@@ -15,16 +15,16 @@ pub(super) struct Reading {
     pub(super) columns: usize,
 }
 
-/// Result of judging a reading.
+/// Result of judging an interpretation.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Verdict {
-    /// No other reading fits better.
+    /// No other interpretation fits better.
     Right,
-    /// Another reading fits clearly better.
+    /// Another interpretation fits clearly better.
     Other(Reading),
-    /// Two other readings fit; the columns of one are a multiple of the other's.
+    /// Two other interpretations fit; the columns of one are a multiple of the other's.
     Either(Reading, Reading),
-    /// Another reading fits as well, and the fourth column has negative values, which intensities do not have.
+    /// Another interpretation fits as well, and the fourth column has negative values, which intensities do not have.
     Doubtful(Reading),
     /// The bytes are not little-endian floats, for instance text or big-endian numbers.
     Wrong(&'static str),
@@ -32,10 +32,10 @@ pub(super) enum Verdict {
 
 /// Numbers per point to try.
 const COLUMNS: std::ops::RangeInclusive<usize> = 3..=8;
-/// Fewer points do not give enough evidence.
+/// Minimum number of points that give enough evidence.
 const FEW_POINTS: usize = 16;
-/// The spread of the correct reading is below this fraction of the spread of any wrong one. Measured fractions for
-/// lidars and depth cameras, also in random point order: 0.01 to 0.3.
+/// Maximum ratio of the spread of the correct interpretation to that of any wrong one. Measured ratios for lidars and
+/// depth cameras, also in random point order, are 0.01 to 0.3.
 const CLEARLY: f64 = 0.5;
 /// Numbers with a larger spread are unrelated.
 const UNRELATED: f64 = 0.7;
@@ -58,8 +58,8 @@ impl<'b> BinStart<'b> {
         Self { bytes, file_bytes }
     }
 
-    /// Judges a reading: in the correct one, successive values of a column are close, and values of different columns
-    /// are not.
+    /// Judges an interpretation. In the correct one, successive values of a column are close, and values of different
+    /// columns are not.
     pub(super) fn judge(&self, reading: Reading) -> Verdict {
         let is_text = |byte: &u8| byte.is_ascii_graphic() || byte.is_ascii_whitespace();
         if self.bytes.len() >= FEW_POINTS && self.bytes.iter().all(is_text) {
@@ -108,8 +108,8 @@ impl<'b> BinStart<'b> {
         Verdict::Right
     }
 
-    /// Returns a reading with a multiple of the columns that fits clearly better. Either it is correct, or the points
-    /// alternate, as those of two lasers do.
+    /// Returns an interpretation with a multiple of the columns that fits clearly better. Either it is correct, or the
+    /// points alternate, as those of two lasers do.
     fn multiple_of(&self, reading: Reading, spreads: &Spreads) -> Option<Reading> {
         let spread = |columns: usize| spreads.at(columns).unwrap_or(f64::INFINITY);
         let mut multiples = (2..=COLUMNS.end() / reading.columns).map(|times| times * reading.columns);
@@ -118,8 +118,8 @@ impl<'b> BinStart<'b> {
         self.file_bytes.is_multiple_of(multiple.point_bytes()).then_some(multiple)
     }
 
-    /// Returns the best other reading with a whole number of points: the one with the least spread, with fewest columns
-    /// among multiples.
+    /// Returns the best interpretation other than `than` that gives a whole number of points: the one with the least
+    /// spread, with fewest columns among multiples.
     fn best(&self, kind: Scalar, spreads: &Spreads, than: Reading) -> Option<Reading> {
         let readings = COLUMNS.map(|columns| Reading { kind, columns });
         let fitting = readings.filter(|reading| self.file_bytes.is_multiple_of(reading.point_bytes()));

@@ -32,7 +32,7 @@ const NAMES: [&str; 12] = [
     "rgb",
     "times",
 ];
-/// Words that occur in names of such files.
+/// Words that occur in names of files that are not clouds.
 const WORDS: [&str; 44] = [
     "accelerometer",
     "assoc",
@@ -79,7 +79,7 @@ const WORDS: [&str; 44] = [
     "vicon",
     "wheel",
 ];
-/// Further words that may occur in addition to these.
+/// Words that do not identify such a file, but may occur in its name in addition to those of [`WORDS`].
 const OTHER_WORDS: [&str; 30] = [
     "base",
     "body",

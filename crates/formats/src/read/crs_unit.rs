@@ -7,7 +7,7 @@ use super::units::LengthUnit;
 pub(super) struct CrsUnit {
     /// Length of the unit in metres.
     pub(super) metres: f64,
-    /// Name and factor as written, if the factor belongs to another unit. The name takes precedence.
+    /// Name and factor as written, if they contradict each other. The name is then used.
     pub(super) conflict: Option<(String, f64)>,
 }
 

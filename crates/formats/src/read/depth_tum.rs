@@ -25,7 +25,7 @@ struct TumFrames {
 /// Image units per metre.
 const SCALE: f64 = 5000.0;
 
-/// Returns whether a folder has the list of a TUM RGB-D data set. Recordings may contain such a file too.
+/// Returns whether a folder has the list of a TUM RGB-D data set. A ROS 2 bag with a file of that name is not one.
 pub(crate) fn is_folder(folder: &Path) -> bool {
     let list = folder.join("depth.txt");
     list.exists() && !list.is_dir() && !is_rosbag2(folder)

@@ -3,9 +3,9 @@ use super::las_units::Units;
 
 /// Largest scale for coordinates in degrees; it corresponds to a tenth of a metre on the ground.
 const MAX_DEGREE_SCALE: f64 = 1e-6;
-/// A file in degrees spans only a few degrees; its heights are in metres.
+/// Maximum extent of x and y of a file in degrees. Its heights are in metres.
 const MAX_DEGREES: f64 = 2.0;
-/// Limits for a cloud without a coordinate system: one from a sensor or a site is neither higher nor wider, in metres.
+/// Maximum plausible height and width, in metres, of a cloud without a coordinate system.
 const MAX_HEIGHT_M: f64 = 2000.0;
 const MAX_WIDTH_M: f64 = 100_000.0;
 

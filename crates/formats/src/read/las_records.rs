@@ -69,7 +69,7 @@ impl Span {
             }
             (at, found) = (next, found + 1);
         }
-        // Records beyond the limit are not inspected.
+        // Records beyond the limit are not inspected, but counted as announced.
         Ok(self.count.max(found))
     }
 }

@@ -73,7 +73,7 @@ impl Units {
             .record(WKT_ID)
             .map(|data| String::from_utf8_lossy(data).trim_end_matches('\0').trim().to_owned());
         let text = text.filter(|text| !text.is_empty());
-        // Both may be present; the header states which one is valid.
+        // A file may have well-known text and GeoTIFF keys; the header states which one is valid.
         let keys = layout.record(KEYS_ID).filter(|_| text.is_none() || !layout.has_wkt);
         if let Some(keys) = keys {
             units.take_keys(keys, layout.record(DOUBLES_ID).unwrap_or_default());

@@ -34,7 +34,7 @@ pub(super) struct Chunks {
     pub(super) is_layered: bool,
     pub(super) data_at: u64,
     pub(super) points: ChunkPoints,
-    /// Whether there is a chunk table. Without one, only the number of points determines their end.
+    /// Whether there is a chunk table. Without one, only the announced number of points shows where the points end.
     pub(super) has_table: bool,
 }
 
@@ -141,7 +141,7 @@ impl ChunkReader<'_> {
         let Some(table_at) = self.table_place(layout)? else { return Ok(None) };
         let data_at = layout.points_at + TABLE_PLACE_BYTES;
         let chunks = number(&bytes_at(self.path, &mut self.input, table_at, 8)?, 4, 4);
-        // Each chunk begins with an uncompressed point.
+        // Each chunk begins with an uncompressed point, which limits the number of chunks.
         let max_chunks = (table_at - data_at.min(table_at)) / self.point_bytes().max(1) + 1;
         if chunks > max_chunks {
             let reason =

@@ -169,7 +169,7 @@ mod tests {
         let mut next = || lines.next().map(|line| line.map(|(number, line)| (number, line.len())));
         assert_eq!(next().unwrap(), Some((1, long)));
         assert_eq!(next().unwrap(), Some((2, 3)));
-        assert_eq!(next().unwrap(), Some((3, long - 1)), "its end is in the last byte");
+        assert_eq!(next().unwrap(), Some((3, long - 1)), "the limit is reached at the end of the line");
         let error = format!("{:#}", next().unwrap_err());
         assert!(error.contains("line 4: the line is longer than 64 KiB"), "{error}");
     }

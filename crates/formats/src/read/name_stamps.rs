@@ -188,9 +188,10 @@ impl Widths {
         self.least < self.most
     }
 
-    /// Decimals have equal widths, or are shorter where trailing zeros are omitted. `sec.nsec` and `sec.usec` without
-    /// leading zeros have different widths and never start with 0. A double cannot hold nine decimals of current Unix
-    /// time.
+    /// Returns the meaning of the digits after a point. Decimals have equal widths, or are shorter where trailing zeros
+    /// are omitted. Integers of nanoseconds or microseconds without leading zeros have different widths and never start
+    /// with 0. Shortened decimals have fewer than nine digits, because a double cannot hold nine decimals of current
+    /// Unix time.
     fn after_point(&self) -> Part {
         match self.most {
             _ if !self.differ() || self.has_zero_start => Part::Decimals,
@@ -200,7 +201,7 @@ impl Widths {
         }
     }
 
-    /// The number after `_` or `-` may be a counter.
+    /// Returns the meaning of the digits after `_` or `-`; `None` if they may be a counter.
     fn after_dash(&self) -> Option<Part> {
         match self.most {
             NANOSECOND_DIGITS => Some(Part::Whole { digits: 0 }),

@@ -139,7 +139,7 @@ impl<R: BufRead> PcdPoints<R> {
             }
             let text = String::from_utf8_lossy(lines.line());
             let words: Vec<&str> = text.split_ascii_whitespace().collect();
-            // A short row is damage; a word is an unknown value.
+            // A row with too few values is damaged. A word in place of a number is an unknown value.
             if let Some(field) = last.filter(|field| words.len() <= field.first_value) {
                 return Err(wrong(
                     number,
@@ -273,7 +273,7 @@ impl Columns {
             meaning.intensity = INTENSITY_NAMES.iter().find_map(|name| find(name));
             return Ok(Self { meaning });
         }
-        // As in text tables: in any case, with units.
+        // Find the fields as columns of text tables are found: in upper or lower case, with units.
         let names: Vec<String> = header.fields.iter().map(|field| field.name.clone()).collect();
         let meaning = Meaning::of(&names, |_| false);
         let meaning = meaning.map_err(|reason| FormatError::at_line(header.data_line, reason))?;
@@ -303,7 +303,7 @@ impl Columns {
         Ok(self.point_of([value(x)?, value(y)?, value(z)?], intensity))
     }
 
-    /// Creates a point from its values. It counts as a return even if they are NaN.
+    /// Creates a point from its values. The point counts as a return even if its values are NaN.
     fn point_of(&self, [x, y, z]: [f64; 3], intensity: Option<f64>) -> CloudPoint {
         let [in_x, in_y, in_z] = self.meaning.units;
         let position_m = [in_x.metres(x), in_y.metres(y), in_z.metres(z)];
@@ -321,7 +321,7 @@ impl Fields {
     fn new(budget: &Budget, bytes: u64) -> Result<Self> {
         match bytes > budget.bytes as u64 {
             true => budget.scratch_file().map(Self::InFile),
-            // The buffer grows as data arrives.
+            // Reserve nothing in advance: the buffer grows as data arrives.
             false => Ok(Self::InMemory(Vec::new())),
         }
     }

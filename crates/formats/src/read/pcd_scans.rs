@@ -56,7 +56,7 @@ pub(crate) fn open(path: &Path, options: &ReadOptions) -> Result<Box<dyn ScanSou
         head.stamp_ns = head.stamp_ns.filter(|_| has_stamps);
         head.world_from_sensor = match head.world_from_sensor {
             None if is_alone && !has_origin => Some(RigidPose::IDENTITY),
-            // Writers without a pose write the identity.
+            // Programs that know no pose write the identity. Ignore it if the sensor origin is given.
             Some(pose) if has_origin && is_identity(&pose) => None,
             // Poses used in calculations are normalised now; poses passed through unchanged are normalised later.
             Some(pose) if !is_plain => Some(normalized(&pose)?),
@@ -116,7 +116,7 @@ fn is_by_line(trajectory: &Trajectory, files: &[PathBuf], stamps: NameStamps) ->
         return Ok(false);
     }
     for (number, of_file) in stamps.into_iter().enumerate() {
-        // A lost row may also lack a valid time.
+        // The stamp is missing if the row has no valid time.
         if trajectory.stamp_of(number)?.is_some_and(|of_pose| of_pose.abs_diff(of_file) > SAME_TIME_NS) {
             return Ok(false);
         }

@@ -11,7 +11,7 @@ pub(crate) fn check_regular(path: &Path) -> Result<()> {
     if !is_special {
         return Ok(());
     }
-    // Formats that read a single cloud in one pass.
+    // The hint applies to formats that read a single cloud in one pass.
     let extension = extension_of(path);
     let is_streamed = extension.is_empty()
         || (Registry::default().formats().iter())

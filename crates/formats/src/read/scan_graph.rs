@@ -34,6 +34,8 @@ pub fn read_scan_graph<R: Read>(input: R, file_bytes: u64, path: &Path) -> Resul
     Ok(graph)
 }
 
+/// Reader of a scan graph:
+///
 /// ```text
 /// count u32
 /// node   points u32, each: i32 3, x y z f64

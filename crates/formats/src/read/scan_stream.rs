@@ -169,7 +169,7 @@ impl<R: StreamInput> ScanStream<R> {
         Ok(())
     }
 
-    /// Creates the error for a stream that ends after this many bytes of the points that start here.
+    /// Creates the error for a stream that ends `bytes` bytes after the start of the current points.
     fn ends_in_points(&self, bytes: u64) -> Error {
         let number = bytes - bytes % 4;
         let what = if number % self.point_bytes() as u64 == 12 { "an intensity" } else { "a point" };

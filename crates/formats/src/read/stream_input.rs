@@ -58,7 +58,7 @@ impl StreamInput for FileInput {
         if bytes > self.known_bytes.saturating_sub(self.at) {
             let metadata = self.file.metadata()?;
             if !metadata.is_file() {
-                // A named pipe.
+                // A named pipe cannot seek, so read the bytes.
                 let passed = io::copy(&mut (&mut self.file).take(bytes), &mut io::sink())?;
                 self.at += passed;
                 return Ok(passed);

@@ -53,7 +53,8 @@ pub(crate) fn check_start(start: &[u8], is_named: bool) -> std::result::Result<(
     if let Some(wrong) = columns.why_none() {
         return Err(at_line(wrong));
     }
-    // A text with column names but no points yet, or one that starts with long comments.
+    // No point was found so far. Accept a text with column names, and a file with a known extension of which only the
+    // start was read.
     match skipped_rows.error() {
         None if columns.are_named() || (is_named && is_cut) => Ok(()),
         Some(error) => Err(error.to_string()),

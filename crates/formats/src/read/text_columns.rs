@@ -30,7 +30,7 @@ pub(super) struct Columns {
     has_points: bool,
     /// Whether every cell of the first point is a number.
     are_numbers: bool,
-    /// Number of columns before the named ones: R writes row names there.
+    /// Number of columns before the named ones. The language R writes row names there.
     unnamed: usize,
     counts: Counts,
     /// First unrecognised line before the points. It is an error unless column names follow.
@@ -281,7 +281,8 @@ impl Columns {
     /// Parses a line as column names, if they include x, y and z.
     fn take_names(&mut self, line: &str) -> Result<bool, String> {
         let names = names_of(line.trim());
-        // Livox counts nanoseconds. Whether other columns hold integers is unknown until all rows are read.
+        // The column `offset_time` of Livox is in nanoseconds. Whether other columns hold integers is unknown until all
+        // rows are read.
         let is_integer =
             |at: usize| names.get(at).is_some_and(|name| name.eq_ignore_ascii_case("offset_time"));
         let Some(meaning) = Meaning::of(&names, is_integer)? else { return Ok(false) };

@@ -236,7 +236,7 @@ mod tests {
             (semicolon, "1.234,5", None),
             (semicolon, "1,234,567", None),
             (Separator::Char(','), "1,25", Some(1.25)),
-            // Possibly thousands.
+            // This may be one thousand two hundred and fifty.
             (Separator::Char(','), "1,250", None),
         ] {
             assert_eq!(separator.number(cell), wanted, "{cell}");
@@ -244,7 +244,7 @@ mod tests {
     }
 
     #[test]
-    fn comments_have_three_marks() {
+    fn comments_start_with_one_of_three_marks() {
         assert_eq!(comment_of("  # x y"), Some(" x y"));
         assert_eq!(comment_of("//X Y"), Some("X Y"));
         assert_eq!(comment_of("% t"), Some(" t"));

@@ -11,7 +11,7 @@ pub(crate) struct LengthUnit {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct TimeUnit {
     pub(crate) seconds: f64,
-    /// Decimal digits between the unit and a nanosecond.
+    /// Power of ten from the unit to nanoseconds: 9 for seconds.
     pub(crate) digits: i32,
 }
 

@@ -21,7 +21,7 @@ const ANGLES: [&str; 4] = ["GEOGCS", "GEOGCRS", "GEOGRAPHICCRS", "GEODCRS"];
 
 impl WktUnits {
     pub(super) fn of(wkt: &str) -> Self {
-        // ASCII upper case preserves the length.
+        // Upper case in ASCII preserves the length, so offsets are valid in both texts.
         let upper = wkt.to_ascii_uppercase();
         let at = |names: &[&str]| names.iter().find_map(|name| node(&upper, name));
         let unit = |names: &[&str]| at(names).and_then(|at| wkt.get(at..)).and_then(last_unit);

@@ -47,7 +47,7 @@ struct Current {
 
 /// Opens the clouds of a recording: a file, a ROS 2 bag folder, or several recordings that follow each other in time.
 ///
-/// The recording is read once here for its poses, and again for its clouds.
+/// This function reads the recording once for its poses. The clouds are read later.
 ///
 /// # Errors
 ///
@@ -181,7 +181,7 @@ impl CloudSource for BagClouds {
             Ok(Some(message)) => message,
             Ok(None) => return Ok(None),
             Err(error) => {
-                // A damaged cloud also uses up a number.
+                // A damaged cloud also uses up a number, so that later clouds keep theirs.
                 self.next += u64::from(!matches!(error, Error::Io { .. }));
                 return Err(error);
             }

@@ -58,7 +58,7 @@ const BODY_NAMES: [&str; 14] = [
     "base", "body", "camera", "imu", "laser", "lidar", "livox", "mapped", "os_", "ouster", "robot", "sensor",
     "vehicle", "velodyne",
 ];
-/// Child frame of poses that do not name it, if it differs from the clouds' frame.
+/// Child frame of poses that name none, if the frame that would be assumed is already the parent frame.
 const UNNAMED_BODY: &str = "(unnamed)";
 /// Memory per sample, in bytes.
 const SAMPLE_BYTES: usize = 96;
@@ -110,7 +110,8 @@ impl BagPoses {
         }
     }
 
-    /// An unusable pose topic is an error: falling back to `/tf` would not be what the user asked for.
+    /// Returns the error for a pose topic without valid poses. There is no fallback to `/tf`, because the user selected
+    /// the topic.
     fn without_track(&self, topic: &Topic) -> Error {
         let (messages, odd) = (topic.messages, self.track.odd);
         let unusable = match odd {
@@ -152,7 +153,8 @@ impl BagPoses {
             let mut message = match recording.next_message() {
                 Ok(Some(message)) => message,
                 Ok(None) => break,
-                // Damage loses a few poses; an I/O error, such as a full disk, could lose all.
+                // A damaged part costs a few poses. An I/O error, such as a full disk, could cost all, so it ends the
+                // read.
                 Err(error @ Error::Io { .. }) => return Err(error),
                 Err(error) => {
                     note(format!("{error:#}"));
@@ -225,7 +227,7 @@ impl BagPoses {
     pub(super) fn see_from_below(&mut self, frame: &str) -> bool {
         let is_like =
             |frame: &str, names: &[&str]| names.iter().any(|name| frame.to_lowercase().contains(name));
-        // Wheels and arms also move relative to a robot's frame.
+        // Require the name of a map, because wheels and arms also move relative to a robot's frame.
         if !is_like(frame, &MAP_NAMES) {
             return false;
         }
@@ -235,7 +237,7 @@ impl BagPoses {
         let base =
             BASE_FRAMES.iter().find_map(|base| moving.iter().map(|(name, _)| name).find(|name| name == base));
         let body = if let [only] = last[..] { Some(only) } else { base };
-        // An arm may move in front of a fixed camera.
+        // Require the name of a robot or sensor, because an arm may move in front of a fixed camera.
         let Some(body) = body.filter(|body| is_like(body, &BODY_NAMES)) else { return false };
         self.registered = Some((frame.to_owned(), body.clone()));
         self.fixed_frame = Some(frame.to_owned());
@@ -303,8 +305,8 @@ impl BagPoses {
         self.lookup(sensor_frame)?.find(stamp_ns)
     }
 
-    /// Returns a lookup of sensor poses at any time. Call it after the first [`BagPoses::place`], which adds the poses of
-    /// a topic to the transforms.
+    /// Returns a lookup of sensor poses at any time. Call it after the first [`BagPoses::place`], which adds the poses
+    /// of a topic to the transforms.
     pub(super) fn lookup(&self, sensor_frame: &str) -> std::result::Result<PoseLookup, WhyNot> {
         let unknown = || Err(WhyNot::UnknownFrame(sensor_frame.to_owned()));
         self.lookups.get(sensor_frame).cloned().unwrap_or_else(unknown)

@@ -23,7 +23,8 @@ pub(super) struct ChunkPlace {
 #[derive(Debug, Default)]
 pub(super) struct OpenChunk {
     pub(super) bytes: Bytes,
-    /// Damage found. Messages before the damage are valid, unless the chunk is broken: then none is used.
+    /// Damage found. Messages before it are valid. If the chunk is broken, no message is used, because any byte may be
+    /// wrong.
     pub(super) complaint: Option<Complaint>,
 }
 

@@ -12,7 +12,7 @@ pub(super) trait ChunkFile {
 
     fn order(&mut self) -> &mut ChunkOrder;
 
-    /// Returns the next step of the order.
+    /// Returns what to do next to read the messages in order.
     fn step(&mut self) -> Result<Step>;
 
     /// Reads a chunk and locates its messages.

@@ -71,7 +71,7 @@ impl<'a> CloudMessage<'a> {
             Self::PointCloud2(cloud) => cloud.points_claimed(),
             Self::PointCloud(cloud) => cloud.count as u64,
             Self::Livox(cloud) => cloud.count as u64,
-            // Invalid beams are skipped.
+            // Count only valid beams, because the others are skipped.
             Self::LaserScan(scan) => scan.points().count() as u64,
             Self::Depth(image, _) => image.pixels_claimed(),
             Self::CompressedDepth(image, _) => image.pixels_claimed(),

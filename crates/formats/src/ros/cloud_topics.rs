@@ -94,7 +94,7 @@ impl CloudTopics {
         });
     }
 
-    /// Selects the only topic.
+    /// Selects the topic of the clouds, which must be the only candidate.
     pub(super) fn choose(self, recording: &dyn Recording, topics: &[Topic]) -> Result<Chosen> {
         let (first, rest) = match self.found.is_empty() {
             true => (&self.others, &[][..]),
@@ -140,7 +140,7 @@ impl CloudTopics {
     }
 
     fn why_none(&self, recording: &dyn Recording, topics: &[Topic]) -> String {
-        // A truncated file may lack the topics.
+        // Add the remarks of the recording, because a truncated file may lack the topics.
         let found_out =
             recording.remarks().into_iter().fold(String::new(), |all, remark| all + "; " + &remark);
         if topics.is_empty() {

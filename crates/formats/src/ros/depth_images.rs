@@ -10,7 +10,7 @@ pub(super) struct DepthImages {
     pub(super) encoding: String,
     /// Evidence from the names of the topic and the frame.
     name: Option<DepthName>,
-    /// Whether the images use a compression only for depths.
+    /// Whether the images have a compression that is used only for depths.
     is_depth_transport: bool,
     is_compressed: bool,
 }

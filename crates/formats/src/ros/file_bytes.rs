@@ -10,7 +10,7 @@ pub(super) struct FileBytes {
     path: PathBuf,
     /// `None` while the file is closed.
     input: Option<Input>,
-    /// The whole file, for parts read independently; `None` until one is used.
+    /// The whole file with a handle of its own, from which parts are read; `None` until the first part is requested.
     whole: Option<FilePart>,
     pub(super) len: u64,
 }

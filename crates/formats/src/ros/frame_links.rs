@@ -6,7 +6,7 @@ use std::cmp::Reverse;
 use std::convert::Infallible;
 
 /// Parents of a frame, each with the poses of the frame in it. A frame has one parent at a time. Transforms with other
-/// parents are kept too, so that a wrong transform hides nothing.
+/// parents are kept too, so that a wrong transform does not displace a correct one.
 #[derive(Clone, Debug, Default)]
 pub(super) struct FrameLinks {
     /// In the order in which the parents first appeared.

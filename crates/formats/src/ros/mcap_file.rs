@@ -36,7 +36,7 @@ const END_MAGIC_BYTES: u64 = 8;
 const MAX_RECORD_BYTES: u64 = 1 << 20;
 /// Limit for consecutive messages outside of chunks that are read together.
 const BARE_CHUNK_BYTES: u64 = 4 << 20;
-/// A group of such messages with more topics is always read, whatever topics are selected.
+/// Maximum number of topics to record for a group of such messages. A group with more topics is always read.
 const MAX_BARE_TOPICS: usize = 64;
 
 impl McapFile {
@@ -328,7 +328,7 @@ impl McapFile {
             false => plain(part, memory_bytes, input, &mut see),
         })?;
         if is_cut {
-            // Truncation also explains a wrong checksum.
+            // Report the truncation, which also explains a wrong checksum.
             let reason = "the file ends within it".to_owned();
             return Ok(OpenChunk { bytes, complaint: Some(Complaint { reason, is_broken: false }) });
         }

@@ -178,7 +178,7 @@ impl Statistics {
     pub(super) fn of(contents: &[u8]) -> Option<Self> {
         let mut pieces = Pieces::new(contents);
         let messages = pieces.u64()?;
-        // Numbers of schemas, channels, attachments and metadata records.
+        // Skip the numbers of schemas, channels, attachments and metadata records.
         pieces.take(2 + 4 + 4 + 4)?;
         let chunks = pieces.u32()?;
         pieces.take(16)?;

@@ -37,7 +37,7 @@ pub trait Recording: Send {
     /// Returns all topics.
     fn topics(&self) -> &[Topic];
 
-    /// Starts from the beginning with the messages of these topics (indices).
+    /// Restarts reading at the beginning. Only messages of these topics (by index) are returned.
     ///
     /// # Errors
     ///

@@ -21,9 +21,9 @@ const MAX_LOOKED_INTO: usize = 20;
 /// Maximum number of messages to read for the first pose of each topic.
 const MAX_MESSAGES: usize = 10_000;
 
-/// Finds the poses of clouds that are already in the map frame, as published by odometry programs. `/tf` does not
-/// contain the sensor position for them. It is taken from a single odometry topic in the clouds' frame, or from a frame
-/// that moves in it.
+/// Finds the poses of clouds that are already in the map frame, as published by odometry programs. For such clouds
+/// `/tf` does not contain the sensor position. The position is taken from a single odometry topic whose parent frame is
+/// that of the clouds, or from a frame that moves relative to that of the clouds.
 pub(super) fn find_registered(
     recording: &mut dyn Recording,
     clouds: usize,

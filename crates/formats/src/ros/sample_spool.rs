@@ -8,7 +8,7 @@ use voxtile::Result;
 pub(super) struct SampleSpool {
     budget: Budget,
     sorter: Sorter<Spooled>,
-    /// Number of sample lists with a number.
+    /// Number of sample lists that were numbered so far.
     numbers: u32,
     /// Number of times the memory was full.
     rounds: u32,

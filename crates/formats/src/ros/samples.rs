@@ -7,7 +7,7 @@ use voxtile::Result;
 #[derive(Clone, Debug, Default)]
 pub(super) struct Samples {
     memory: BTreeMap<i64, RigidPose>,
-    /// Sorted by strictly increasing time. Samples are either here or in memory.
+    /// Samples in a file, sorted by strictly increasing time. Each sample is either here or in `memory`.
     filed: PoseList,
     /// First and last stamp of the samples that are being sorted.
     waiting: Option<(i64, i64)>,

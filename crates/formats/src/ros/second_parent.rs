@@ -7,7 +7,7 @@ pub struct SecondParent {
     pub child: String,
     /// The latest parent.
     pub parent: String,
-    /// The parent in use otherwise.
+    /// Another parent of the frame, if it has one.
     pub before: Option<String>,
     /// Frames of the loop that the transform closes: from the parent up to the child. Empty if there is no loop.
     pub loop_frames: Vec<String>,

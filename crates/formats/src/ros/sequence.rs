@@ -60,14 +60,14 @@ impl Recording for Sequence {
                 part.recording.begin(&own)?;
             }
             let Some(message) = part.recording.next_message()? else {
-                // Frees the chunks in memory.
+                // Selecting no topics frees the chunks in memory.
                 part.recording.begin(&[])?;
                 part.recording.close_files();
                 self.at += 1;
                 self.has_begun = false;
                 continue;
             };
-            // A topic that first appears within a file could not be selected.
+            // Skip topics that were not yet known when the topics were selected.
             if let Some(&topic) = part.topics.get(message.topic) {
                 return Ok(Some(Message { topic, ..message }));
             }

@@ -26,13 +26,13 @@ pub struct Transforms {
     most_gap_ns: Option<i64>,
 }
 
-/// Frames to search for poses of a frame in another, so that unrelated frames cost nothing.
+/// Frames to visit in a search for the pose of one frame in another, so that unrelated frames take no time.
 #[derive(Debug)]
 pub(super) struct SearchFrames {
     /// See [`Transforms::frames_between`].
     between: HashSet<String>,
-    /// All ancestors of the source, if they include the target at some time: at other times, a common ancestor may
-    /// connect the two frames. `None` if there are too many.
+    /// All ancestors of the source, if they include the target at some time, because a common ancestor may connect the
+    /// two frames at other times. `None` if there are too many.
     above: Option<HashSet<String>>,
 }
 
@@ -254,7 +254,7 @@ impl Transforms {
 
     fn above<'a>(&'a self, frame: &'a str) -> Search<'a> {
         let trusted = self.search(frame, Step::is_trusted, |_| false);
-        // A moving ancestor must be found without the single transforms, which are ignored then.
+        // Ignore single transforms if a moving ancestor is found without them.
         let moves = |frame: &&str| self.frames.get(*frame).is_some_and(FrameLinks::moves);
         if trusted.frames.iter().any(moves) {
             return trusted;
@@ -279,8 +279,8 @@ impl Transforms {
         self.frames.get(bare(child)).is_some_and(FrameLinks::is_moving)
     }
 
-    /// Returns the moving frames below a frame, sorted by name, each with whether no frame moves below it. The robot or
-    /// sensor is such a frame below its map.
+    /// Returns the names of the moving frames below a frame, sorted. The flag is true if no frame moves below the named
+    /// one. The frame of the robot or sensor is such a frame below the map frame.
     pub(super) fn moving_below(&self, frame: &str) -> Vec<(String, bool)> {
         let frame = bare(frame);
         let mut children: HashMap<&str, Vec<&str>> = HashMap::new();
@@ -292,7 +292,7 @@ impl Transforms {
         let moves = |child: &str| self.frames.get(child).is_some_and(FrameLinks::moves);
         let moving: Vec<&str> =
             below(&children, frame).into_iter().filter(|child| *child != frame && moves(child)).collect();
-        // A robot has fewer moving frames.
+        // A robot does not have that many moving frames.
         if moving.len() > MAX_MOVING {
             return Vec::new();
         }
@@ -404,8 +404,8 @@ impl Transforms {
         Ok(route.map(|steps| steps.iter().map(|step| step.child.to_owned()).collect()))
     }
 
-    /// Returns the steps from both frames up to their common ancestor. Doubtful steps are used only if no others lead
-    /// there: they give no pose, only the reason why it is unknown.
+    /// Returns the steps from both frames up to their common ancestor. Untrusted steps are used only if no trusted ones
+    /// lead there. They mostly serve to find the reason why the pose is unknown.
     fn route<'a>(
         &'a self,
         target: &'a str,
@@ -419,7 +419,7 @@ impl Transforms {
         let Some(above) = above else {
             return self.route_among(target, source, stamp_ns, Some(between));
         };
-        // The full search would also return a trusted upward path.
+        // Try the trusted upward steps first, because a search of all ancestors is slower and gives the same path.
         let trusted = |at: &'a str| {
             let steps = self.steps_at(at, stamp_ns)?;
             Ok(kept(steps, |step| step.is_trusted() && between.contains(step.parent)))
@@ -484,7 +484,7 @@ fn below<'a>(children: &HashMap<&'a str, Vec<&'a str>>, from: &str) -> HashSet<&
 }
 
 /// Searches for the target above the source, then for the source above the target, then for a common ancestor. In a
-/// tree the path is unique. In a loop, the first path is the robot's, because frames above the map frame are
+/// tree the path is unique. In a loop, the first path found is the robot's, because frames above the map frame are
 /// irrelevant.
 fn route_by<'a>(
     target: &'a str,

@@ -65,7 +65,7 @@ mod tests {
     #[test]
     fn poses_without_stamps_use_recording_times() {
         assert_eq!(stamps(&[0, 0, 0]), (vec![100, 101, 102], 3));
-        assert_eq!(stamps(&[0, 0, 5, 0]), (vec![0, 0, 5, 0], 0), "simulations begin at 0");
+        assert_eq!(stamps(&[0, 0, 5, 0]), (vec![0, 0, 5, 0], 0), "a stamp of 5 makes 0 valid");
         assert_eq!(stamps(&[]), (vec![], 0));
         let (many, count) = stamps(&[0; 1500]);
         assert_eq!((many, count), ((100..1600).collect(), 1500));

@@ -49,8 +49,7 @@ const CDR_HEADER: usize = 4;
 
 macro_rules! numbers {
     ($($name:ident: $type:ty),*) => {$(
-        #[doc = concat!("A number of type `", stringify!($type), "`.")]
-        /// Reads the next number.
+        #[doc = concat!("Reads the next number, of type `", stringify!($type), "`.")]
         ///
         /// # Errors
         ///

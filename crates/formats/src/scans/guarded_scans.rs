@@ -7,8 +7,8 @@ use crate::read::guard::catch;
 use std::path::{Path, PathBuf};
 use voxtile::{Error, Result};
 
-/// Wraps a reader that may panic on an unexpected file. A panic becomes an error with the name of the input, and ends
-/// it.
+/// Wraps a reader that may panic on an unexpected file. A panic becomes an error with the name of the input. After it,
+/// the input has no further scans.
 pub(crate) struct GuardedScans {
     source: Box<dyn ScanSource + Send>,
     path: PathBuf,
@@ -24,7 +24,7 @@ impl GuardedScans {
         Ok(Box::new(Self { source, path: path.to_owned(), has_panicked: false }))
     }
 
-    /// After a panic the reader is not used again, and there are no further scans.
+    /// Calls the reader, or returns `none` after a panic, because the reader must not be used again.
     fn guard<T>(&mut self, none: T, call: impl FnOnce(&mut dyn ScanSource) -> Result<T>) -> Result<T> {
         if self.has_panicked {
             return Ok(none);

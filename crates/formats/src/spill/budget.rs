@@ -44,7 +44,7 @@ impl Budget {
         tempfile::tempfile_in(&folder).map_err(|error| self.cannot("make", error))
     }
 
-    /// Creates a temporary file that is read as memory.
+    /// Creates a temporary file that is read through memory mappings.
     pub(crate) fn scratch_file(&self) -> Result<ScratchFile> {
         let folder = self.scratch.clone().unwrap_or_else(std::env::temp_dir);
         ScratchFile::in_folder(&folder).map_err(|error| self.cannot("make", error))

@@ -8,7 +8,8 @@ use std::sync::{Arc, Mutex, PoisonError};
 use voxtile::Result;
 
 /// Temporary file for data that exceeds the memory of a reader. Its space is reused as soon as no part of it is in use.
-/// If parts overlap in time for long, another file replaces it, and each file is freed with its last part.
+/// If parts are in use at all times and the file grows too large, a new file replaces it; the old one is freed with its
+/// last part.
 #[derive(Debug)]
 pub(crate) struct SpillFile {
     budget: Budget,

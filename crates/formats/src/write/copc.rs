@@ -17,7 +17,7 @@ use std::path::PathBuf;
 
 /// Size of a record in the first sort: a 96-bit Morton code and a point.
 const CODED_BYTES: usize = 12 + POINT_BYTES;
-/// Size of a record in the second sort: a level, then the above.
+/// Size of a record in the second sort: a level, then a record of the first sort.
 const LEVELLED_BYTES: usize = 1 + CODED_BYTES;
 const NODE_BYTES: usize = 32;
 

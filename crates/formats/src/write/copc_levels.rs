@@ -3,9 +3,9 @@ const NODE_BITS: u32 = 6;
 
 /// Octree around voxels that assigns each voxel to a level of detail.
 ///
-/// In Morton order, the first voxel of each cell represents its cell. A voxel belongs to the coarsest level at which it
-/// is the first of a cell. Each voxel is thus in exactly one node, and the levels above form a coarser version of the
-/// whole.
+/// Each level divides space into cells. In Morton order, the first voxel of a cell represents this cell. A voxel
+/// belongs to the coarsest level at which it is the first of a cell. So each voxel is in exactly one node, and the
+/// coarser levels alone give a thinned version of all voxels.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Levels {
     /// Edge of the octree, as a power of two of voxels.

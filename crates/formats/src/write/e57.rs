@@ -69,8 +69,8 @@ impl VoxelSink for E57Sink {
     }
 }
 
-/// Prepares a coordinate system for a CDATA section by the library. `]]>` within the text is split between two
-/// sections, which readers join.
+/// Escapes the text of a coordinate system, which the library writes as a CDATA section. `]]>` within the text is split
+/// between two sections, which readers join.
 fn as_cdata(crs: &str) -> Result<String> {
     let is_xml = |c: char| matches!(c, '\t' | '\n' | '\r' | ' '..='\u{fffd}' | '\u{10000}'..);
     if let Some(c) = crs.chars().find(|c| !is_xml(*c)) {

@@ -64,7 +64,7 @@ impl VoxelSink for HeightmapSink {
         let (resolution_m, share) = (self.head.resolution_m, layers_per_value(&grid));
         let [x, y, z] = grid.corner_m();
         let scale_m = resolution_m * share as f64;
-        // Value 1 is the middle of the lowest layers.
+        // Value 1 is the height of the middle of the lowest layers.
         let offset_m = z - 0.5 * scale_m;
         let [width, height] = grid.size();
         let path = self.out.path().to_owned();

@@ -30,7 +30,7 @@ impl McapSink {
         let topic = Topic { name: TOPIC, type_name: "sensor_msgs/msg/PointCloud2", definition: SCHEMA };
         let file = McapFile::create(path, &topic)?;
         let fits = head.bounds_m.as_flattened().iter().all(|bound| {
-            // Half the distance of neighbouring single precision numbers at this location.
+            // Upper bound on the distance between neighbouring single precision numbers at this location.
             bound.abs() * f64::from(f32::EPSILON) <= head.resolution_m / 16.0
         });
         let of = if fits { FieldType::Float32 } else { FieldType::Float64 };

@@ -94,7 +94,7 @@ impl OutputFormat {
     ///
     /// # Errors
     ///
-    /// It does not.
+    /// The build does not support the format.
     pub fn check_built(&self) -> Result<()> {
         let Writer::NotBuilt = self.writer else { return Ok(()) };
         let feature = self.feature.unwrap_or_default();

@@ -23,7 +23,7 @@ fn corpus_files_break_no_reader() {
         let files: Vec<PathBuf> = entries.map(|entry| entry.unwrap().path()).collect();
         assert!(!files.is_empty(), "{} is empty", folder.display());
         for path in files {
-            // Names the file if the next line panics.
+            // Print the name of the file, in case the next line panics.
             println!("{}", path.display());
             target(&fs::read(&path).unwrap());
         }

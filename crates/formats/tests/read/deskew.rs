@@ -66,7 +66,7 @@ fn assert_deskews(points: &[CloudPoint], pose_at: impl FnMut(i64) -> Option<Rigi
     let (skewed_m, deskewed_m) =
         (worst_m(points, |point| point.position_m), worst_m(points, |point| deskew.apply(point)));
     assert_eq!(deskew.stayed(), 0, "{of}");
-    assert!(skewed_m > 0.3, "{of}: without it, points are {skewed_m} m off at most");
+    assert!(skewed_m > 0.3, "{of}: without deskewing, points are only {skewed_m} m off");
     assert!(deskewed_m < 2e-5, "{of}: {deskewed_m} m off");
 }
 

@@ -66,7 +66,7 @@ fn damage_never_panics() {
     }
 }
 
-/// The library would create points until the memory is exhausted.
+/// If points take no bits in the file, the library would create points until the memory is exhausted.
 #[test]
 fn points_without_bits_are_refused() {
     let folder = tempfile::tempdir().unwrap();
@@ -111,7 +111,7 @@ fn foreign_and_truncated_files_are_errors() {
     }
 }
 
-/// The library compares each attribute of a tag with the previous ones.
+/// The library compares each attribute of a tag with the previous ones, so many attributes take very long.
 #[test]
 fn tags_with_many_attributes_are_refused() {
     let folder = tempfile::tempdir().unwrap();
@@ -122,7 +122,7 @@ fn tags_with_many_attributes_are_refused() {
     assert!(error.contains("more than 256 attributes in one tag"), "{error}");
 }
 
-/// A packet is decoded as a whole.
+/// The library decodes a packet as a whole, so a packet must fit in memory.
 #[test]
 fn packets_that_exceed_the_memory_are_refused() {
     use e57::{E57Writer, Record, RecordDataType, RecordName, RecordValue};

@@ -235,7 +235,7 @@ fn points_without_time_are_only_skipped_in_scans() {
     assert!(remark.starts_with("2 of 400 points have a GPS time of NaN"), "{remark}");
     assert!(remark.contains("first record 7; `scan_period` 0"), "{remark}");
     assert!(counts[1..].iter().all(|(points, remarks)| *points == 400 && remarks.is_empty()), "{counts:?}");
-    // No point would remain.
+    // All points have an invalid time.
     (0..400).for_each(|k| bytes[time_at(k)..time_at(k) + 8].copy_from_slice(&f64::NAN.to_le_bytes()));
     fs::write(&path, &bytes).unwrap();
     let (error, points) = failure(&path, &ReadOptions::default());

@@ -102,7 +102,7 @@ fn coordinates_that_look_like_degrees_or_millimetres_are_remarked() {
     );
     // Equal steps on all axes: heights in metres too.
     let narrow = Las { scales: [1e-7, 1e-7, 1e-7], offsets: [-77.03, 38.9, 12.0], ..Las::new(2, 1, 400) };
-    assert_eq!(hint(&narrow), "", "a cloud of a millimetre in fine steps");
+    assert_eq!(hint(&narrow), "", "a small cloud with equal scales gives no hint");
     let millimetres = Las { scales: [1.0; 3], offsets: [0.0; 3], points: 40_000, ..Las::new(2, 0, 40_000) };
     let remark = hint(&millimetres);
     assert!(remark.contains("if they are millimetres or feet"), "{remark}");

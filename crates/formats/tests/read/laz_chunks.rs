@@ -41,7 +41,7 @@ fn points_of(clouds: Vec<Cloud>) -> Vec<CloudPoint> {
     clouds.into_iter().flat_map(|(_, points)| points).collect()
 }
 
-fn assert_says(error: &str, at: usize, what: &str) {
+fn assert_error_at(error: &str, at: usize, what: &str) {
     assert!(
         error.contains(&format!("damaged.laz: malformed: offset {at}: ")) && error.contains(what),
         "{error}"
@@ -55,7 +55,7 @@ fn false_chunk_tables_are_refused() {
     for file in [&by_point, &by_layer, &voxel_file("copc")] {
         let (points_at, table_at) = places(file);
         let error = of_damaged(file, table_at + 4, &[0xff; 4]);
-        assert_says(&error, table_at + 4, "the chunk table lists 4294967295 chunks");
+        assert_error_at(&error, table_at + 4, "the chunk table lists 4294967295 chunks");
         // Without the table, each chunk states its number of points.
         let (points, remarks) = of_changed(file, points_at, &u64::to_le_bytes(1 << 40));
         assert!(
@@ -82,16 +82,16 @@ fn false_chunk_tables_are_refused() {
         assert!(refused > 50, "{refused}");
     }
     let (points_at, _) = places(&by_layer);
-    // After the table's offset, the first point and the number of points.
+    // The sizes of the layers follow the offset of the table, the first point and the number of points.
     let lengths_at = points_at + 8 + 42 + 4;
     let error = of_damaged(&by_layer, lengths_at, &[0xff; 4]);
-    assert_says(&error, lengths_at, "the fields of a chunk need 42949");
+    assert_error_at(&error, lengths_at, "the fields of a chunk need 42949");
     // Found by fuzzing: if the fields end before their chunk, the library looks for the next chunk in the remaining
     // bytes.
     let shorter =
         (u32::from_le_bytes(by_layer[lengths_at..lengths_at + 4].try_into().unwrap()) - 1).to_le_bytes();
     let error = of_damaged(&by_layer, lengths_at, &shorter);
-    assert_says(&error, lengths_at, "the fields of a chunk need ");
+    assert_error_at(&error, lengths_at, "the fields of a chunk need ");
 }
 
 /// Found by fuzzing: the layers were not checked if the compressor type claimed that there are none.
@@ -103,7 +103,7 @@ fn compressor_type_must_match_item_versions() {
         // The description follows the record header, which begins with two bytes and the user ID.
         let name_at = file.windows(14).position(|bytes| bytes == b"laszip encoded").unwrap();
         let error = of_damaged(&file, name_at - 2 + 54, &compressor.to_le_bytes());
-        assert_says(&error, 100, &format!("compressor type {compressor} contradicts"));
+        assert_error_at(&error, 100, &format!("compressor type {compressor} contradicts"));
     }
 }
 
@@ -116,9 +116,9 @@ fn more_points_than_in_chunks_are_refused() {
     assert!(remarks.contains("announces 1125899906842624 points; 30 exist"), "{remarks}");
     let by_point = Las { legacy: 1 << 30, ..Las::new(2, 1, 400) }.packed(Packing::Chunked(100));
     let error = of_damaged(&by_point, 107, &u32::to_le_bytes(1 << 30));
-    assert_says(&error, 107, "1073741824 points are announced, but the chunk table lists 400");
+    assert_error_at(&error, 107, "1073741824 points are announced, but the chunk table lists 400");
     let error = of_damaged(&by_layer, 105, &60_000_u16.to_le_bytes());
-    assert_says(&error, 105, "points of 60000 bytes are compressed as 2 parts of 42 bytes");
+    assert_error_at(&error, 105, "points of 60000 bytes are compressed as 2 parts of 42 bytes");
 }
 
 /// Each point of a COPC file is read once, in the order of the chunks.

@@ -79,7 +79,7 @@ fn raw_floats_that_do_not_fit_their_columns_are_an_error() {
     assert_eq!(points, 0);
 }
 
-/// Encodes the points of a wall, one row each: with a ring, or as in KITTI.
+/// Encodes a file of raw floats. `row` returns the columns of a point.
 fn raw_floats(points: usize, row: impl Fn(f32) -> Vec<f32>) -> Vec<u8> {
     (0..points).flat_map(|k| row(k as f32)).flat_map(f32::to_le_bytes).collect()
 }
@@ -97,8 +97,8 @@ fn five_columns_are_not_read_as_four() {
     let (_, points) = clouds_with(&path, &ReadOptions { fields: Some(five), ..Default::default() }).remove(0);
     assert_eq!((points.len(), points[1].position_m[0], points[33].intensity), (400, 8.25, 33.0));
     let four = ["x", "y", "z", "intensity"].map(str::to_owned).to_vec();
-    let asked = ReadOptions { fields: Some(four), ..Default::default() };
-    assert_eq!(clouds_with(&path, &asked)[0].1.len(), 500);
+    let four_columns = ReadOptions { fields: Some(four), ..Default::default() };
+    assert_eq!(clouds_with(&path, &four_columns)[0].1.len(), 500);
 }
 
 #[test]

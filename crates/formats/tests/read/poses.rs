@@ -308,7 +308,8 @@ fn kitti_camera_poses_are_converted_to_lidar_poses() {
     assert_eq!(plain.by_number(1).unwrap().unwrap().position_m, [0.0, 0.0, 5.0]);
 }
 
-/// A map built from one of the two forms can be resumed with the other.
+/// This reader and `Pose::from_matrix` must convert matrices to the same bits, so that a map built with one can be
+/// resumed with the other.
 #[test]
 fn matrices_give_bit_identical_poses_to_the_engine() {
     let (mut text, mut wanted) = (String::new(), Vec::new());
@@ -459,5 +460,5 @@ fn invalid_arrays_report_the_expected_layout() {
         let error = fail(name, bytes);
         assert!(error.contains(wanted), "{error}");
     }
-    assert_eq!(read(&format!("\u{feff}{TUM}")).unwrap().len(), 3, "a mark of UTF-8 is none of UTF-16");
+    assert_eq!(read(&format!("\u{feff}{TUM}")).unwrap().len(), 3, "a UTF-8 byte order mark is accepted");
 }

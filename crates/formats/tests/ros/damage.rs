@@ -185,7 +185,7 @@ fn assert_same(clouds: &[Cloud], whole: &[Cloud], have_names: bool) {
     }
 }
 
-/// The topics of a damaged chunk and the number of its messages are known.
+/// If all clouds are damaged, their number is still known, and each is reported as an error.
 #[test]
 fn damage_without_index_and_clouds_is_reported() {
     let folder = tempfile::tempdir().unwrap();
@@ -206,7 +206,7 @@ fn damage_without_index_and_clouds_is_reported() {
     assert!(errors.iter().all(|error| error.contains("a chunk is damaged")), "{errors:?}");
 }
 
-/// Whatever the decoder outputs before it fails.
+/// Each cloud must equal an original one, whatever the decoder outputs before it fails.
 #[test]
 fn no_cloud_is_read_from_damaged_bytes() {
     let folder = tempfile::tempdir().unwrap();

@@ -47,7 +47,7 @@ fn transforms_closing_a_loop_lose_no_pose_of_a_recording() {
     assert_eq!(remarks, ["2 transforms are invalid and were skipped; the first: a frame has no name"]);
 }
 
-/// At other times there is no pose, instead of the pose of the mount.
+/// At other times the pose is unknown. The pose of the mount alone must not be returned.
 #[test]
 fn single_transforms_give_a_pose_only_at_their_time() {
     let folder = tempfile::tempdir().unwrap();

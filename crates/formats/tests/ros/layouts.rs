@@ -212,7 +212,7 @@ fn old_clouds_are_read_with_their_channels() {
     assert!(errors[0].contains("topic /points: byte"), "{errors:?}");
 }
 
-/// A driver without a clock.
+/// A driver without a clock writes the stamp 0 and the time base 0.
 #[test]
 fn livox_messages_of_both_drivers_are_read() {
     let point = MessageWriter::ros1()

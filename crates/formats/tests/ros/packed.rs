@@ -65,7 +65,7 @@ fn databases_of_compressed_messages_are_read_without_metadata() {
     assert_clouds(&clouds, "map", "by message");
 }
 
-/// Messages in a ROS 1 bag may contain arbitrary bytes.
+/// Messages in a ROS 1 bag may contain any bytes, even the signature of a compressed message.
 #[test]
 fn ros_1_messages_are_not_decompressed() {
     let folder = tempfile::tempdir().unwrap();
@@ -89,14 +89,14 @@ fn compressed_files_are_read_without_metadata() {
             let (clouds, errors, remarks) =
                 read(from_ref(&path), &BagOptions { poses: PoseSource::None, ..topic("/points") });
             assert_eq!((clouds.len(), errors, remarks), (4, vec![], vec![]), "{name}");
-            // Also if the format is given.
+            // The file is also read if its format is given.
             let named = ReadOptions { format: Some(format.to_owned()), ..ReadOptions::default() };
             let named = ReadOptions {
                 recording: RecordingOptions { topic: Some("/points".into()), ..Default::default() },
                 ..named
             };
             assert_eq!(open_clouds(&path, &named).unwrap().len_hint(), Some(4));
-            // As the only file of a folder.
+            // The file is also read if it is the only one of a folder.
             let inner = tempfile::tempdir().unwrap();
             std::fs::copy(&path, inner.path().join(format!("{name}.{end}"))).unwrap();
             assert_eq!(guess(inner.path()).unwrap(), format);
@@ -115,7 +115,7 @@ fn compressed_files_are_read_without_metadata() {
     assert!(error.contains("b.mcap.zst: malformed: offset 0: it was unpacked, but its contents"), "{error}");
 }
 
-/// A recorder whose disk was disconnected.
+/// A recorder whose disk is disconnected leaves a file that ends within its first chunk.
 #[test]
 fn files_truncated_before_any_message_report_the_offset() {
     let folder = tempfile::tempdir().unwrap();
@@ -127,7 +127,7 @@ fn files_truncated_before_any_message_report_the_offset() {
             "bz2.bag" => whole.windows(3).position(|bytes| bytes == b"BZh").unwrap(),
             _ => 8 + 9 + u64::from_le_bytes(whole[9..17].try_into().unwrap()) as usize + 9 + 60,
         };
-        // Also within the header of a record.
+        // The file may also end within the header of a record.
         let len = if at == 3 { start - 60 - 9 + at } else { start + at };
         std::fs::write(&path, &whole[..len]).unwrap();
         let error =

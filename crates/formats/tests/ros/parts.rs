@@ -102,7 +102,7 @@ fn files_outside_of_the_bag_folder_are_not_read() {
 #[test]
 fn compressed_parts_with_equal_names_are_all_read() {
     let folder = tempfile::tempdir().unwrap();
-    // Larger than the read buffer of the open file.
+    // The first file is larger than the read buffer of an open file.
     for (part, count) in [("a", 100), ("b", 1)] {
         std::fs::create_dir(folder.path().join(part)).unwrap();
         let messages: Vec<_> = (0..count).map(|stamp_ns| (0, stamp_ns, vec![7; 4000])).collect();

@@ -134,7 +134,7 @@ fn registered_clouds_use_moving_frames() {
             ],
             body,
         ),
-        // The map is static.
+        // The map frame is a static parent.
         (
             vec![
                 cloud("camera_init"),
@@ -161,7 +161,7 @@ fn registered_clouds_use_moving_frames() {
             ],
             "rays start at odom_mapping (`odometry` /odometry `world_frame`)",
         ),
-        // Wheels move too.
+        // Wheels move too, but below the robot's frame.
         (
             vec![
                 cloud("odom"),
@@ -198,7 +198,7 @@ fn ambiguous_poses_are_not_guessed() {
             vec![cloud("base_link"), ("/tf", Tf("base_link", "wheel"))],
             "no transform describes how base_link moves",
         ),
-        // An arm in front of a fixed camera.
+        // An arm moves in front of a fixed camera.
         (vec![cloud("world"), ("/tf", Tf("world", "gripper"))], "no transform describes how world moves"),
         // Odometry of the sensor itself is only used if requested.
         (
@@ -233,7 +233,7 @@ fn clouds_of_a_sensor_are_not_registered() {
     assert_eq!(remarks, Vec::<String>::new());
     assert_eq!(clouds[2].0.world_from_sensor.unwrap().position_m, [2.0, 0.0, 0.5]);
     assert!(!clouds[2].0.is_in_world);
-    // A sensor that is fixed in the map.
+    // A sensor may be fixed in the map.
     let (_folder, path) =
         record(&[("/cloud_registered", Clouds("lidar")), ("/tf_static", Still("map", "lidar"))]);
     let (clouds, _, remarks) = read(&[path], &BagOptions::default());
@@ -272,7 +272,7 @@ fn scans_of_registered_clouds_keep_their_points() {
     );
 }
 
-/// Drivers without a clock.
+/// Drivers without a clock write the stamp 0.
 #[test]
 fn poses_without_stamps_use_recording_times() {
     let folder = tempfile::tempdir().unwrap();

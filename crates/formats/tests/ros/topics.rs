@@ -4,7 +4,7 @@ use crate::support::read;
 use std::time::{Duration, Instant};
 use voxtile_formats::ros::{BagOptions, open_bag};
 
-/// More topic names than the limit, and messages of these topics before the wanted ones.
+/// There are more topic names than the limit, and the messages of these topics precede the wanted ones.
 #[test]
 fn skipped_topics_do_not_affect_others() {
     let folder = tempfile::tempdir().unwrap();

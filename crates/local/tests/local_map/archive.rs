@@ -27,7 +27,7 @@ fn one_call_updates_both_maps_as_separate_calls_would() {
     }
     assert_eq!(both.archive().digest().unwrap(), archive.digest().unwrap());
     assert_equal(both.local(), &local, "with an archive");
-    // A scan refused by one map changes neither.
+    // If one map refuses a scan, both maps are unchanged.
     assert!(both.insert_scan(&scan([f64::NAN; 3], &[])).is_err());
     assert_eq!(both.archive().digest().unwrap(), archive.digest().unwrap());
     assert_equal(both.local(), &local, "after an error");
@@ -48,7 +48,7 @@ fn the_archive_distinguishes_free_from_unknown() {
     assert!(matches!(at([1.05, 0.05, 0.05]), LocalAnswer::Free(p) if p < 0.5));
     assert_eq!(at([1.05, 1.05, 0.05]), LocalAnswer::Unknown);
     assert_eq!(at([f64::NAN; 3]), LocalAnswer::Unknown);
-    // Removed from the local map, but still in the archive.
+    // This voxel was removed from the local map, but is still in the archive.
     assert_eq!(both.local().view().state_at([3.05, 0.05, 0.05]), LocalState::None);
     assert_eq!(at([3.05, 0.05, 0.05]), LocalAnswer::Occupied);
 }
@@ -85,7 +85,7 @@ fn priming_adds_the_nearest_archive_voxels_as_older_than_observed_ones() {
         assert_eq!(new, wanted.len());
         wanted.extend(&seen);
         assert!(map.history().map(|(voxel, _)| voxel).eq(wanted.iter().copied()));
-        // Inflation as if all voxels had been observed.
+        // The inflation must be the same as if all voxels had been observed by scans.
         let mut naive = ReferenceLocal::new(0.1, parameters);
         (naive.position, naive.history) = (position, map.history().collect());
         assert_equal(&map, &naive, "when primed");

@@ -14,7 +14,7 @@ fn map(parameters: LocalParameters) -> LocalMap {
     LocalMap::new(0.1, parameters).unwrap()
 }
 
-/// Algorithm 1, line 4 stops at the first point that is too far.
+/// The paper's Algorithm 1, line 4 stops at the first point that is too far.
 #[test]
 fn a_point_that_is_too_far_is_skipped_alone() {
     let mut map = map(parameters().with_ranges(5.0, f64::INFINITY));
@@ -23,7 +23,8 @@ fn a_point_that_is_too_far_is_skipped_alone() {
     assert_eq!((report.beyond_input_range, report.new, map.stored_voxels()), (1, 2, 2));
 }
 
-/// Algorithm 1, lines 10 and 19 put every voxel with occupancy into the inflation map, even if no voxel inflates it.
+/// The paper's Algorithm 1, lines 10 and 19 put every stored voxel into the inflation map, even if no voxel inflates
+/// it.
 #[test]
 fn a_voxel_is_inflated_only_if_an_occupied_one_inflates_it() {
     let mut unsure = parameters();
@@ -34,7 +35,7 @@ fn a_voxel_is_inflated_only_if_an_occupied_one_inflates_it() {
     assert_eq!(map.view().state_at([1.05, 0.05, 0.05]), LocalState::None);
 }
 
-/// Algorithm 1, lines 12 to 14 ignore the initial probability if the voxel was inflated before.
+/// The paper's Algorithm 1, lines 12 to 14 ignore the initial probability if the voxel was inflated before.
 #[test]
 fn an_inflated_voxel_starts_with_the_initial_probability() {
     let mut likely = parameters();
@@ -48,7 +49,8 @@ fn an_inflated_voxel_starts_with_the_initial_probability() {
     assert_eq!(log_odds[0], log_odds[1]);
 }
 
-/// Algorithm 1, line 20 casts a ray before later points are in the map: misses depend on the order of the points.
+/// The paper's Algorithm 1, line 20 casts a ray before later points are in the map: misses depend on the order of the
+/// points.
 #[test]
 fn misses_do_not_depend_on_the_order_of_the_points() {
     let points = [[1.05, 0.05, 0.05], [2.05, 0.05, 0.05], [3.05, 0.05, 0.05]];
@@ -64,8 +66,8 @@ fn misses_do_not_depend_on_the_order_of_the_points() {
     assert!(forward[0].1 < forward[1].1 && forward[1].1 < forward[2].1);
 }
 
-/// Algorithm 2, line 2 considers only voxels that changed in this step: voxels that became occupied out of range are
-/// not inflated when the robot approaches, and inflated voxels remain so after it has left.
+/// The paper's Algorithm 2, line 2 considers only voxels that changed in this step: voxels that became occupied out of
+/// range are not inflated when the robot approaches, and inflated voxels remain so after it has left.
 #[test]
 fn inflation_follows_the_robot() {
     let mut map = map(parameters().with_ranges(f64::INFINITY, 3.0));
@@ -77,7 +79,7 @@ fn inflation_follows_the_robot() {
     }
 }
 
-/// Algorithm 2, lines 8 to 10 decrement counts that were never incremented.
+/// The paper's Algorithm 2, lines 8 to 10 decrement counts that were never incremented.
 #[test]
 fn counts_never_go_below_zero() {
     let mut map = map(parameters());
@@ -93,7 +95,7 @@ fn counts_never_go_below_zero() {
     assert_eq!(map.view().state_at(wall), LocalState::Inflated);
 }
 
-/// Algorithm 3, line 15 removes voxels from both maps, even if other voxels still inflate them.
+/// The paper's Algorithm 3, line 15 removes voxels from both maps, even if other voxels still inflate them.
 #[test]
 fn freed_voxels_remain_inflated_by_others() {
     let mut map = map(parameters());
@@ -104,7 +106,8 @@ fn freed_voxels_remain_inflated_by_others() {
     assert_eq!(map.view().state_at([2.05, 0.15, 0.05]), LocalState::Occupied);
 }
 
-/// Algorithm 3, line 19 runs after the inflation: the inflation of voxels removed by the limit is never removed.
+/// The paper's Algorithm 3, line 19 runs after the inflation: the inflation of voxels removed by the limit is never
+/// removed.
 #[test]
 fn removed_voxels_no_longer_inflate_others() {
     let mut map = map(parameters().with_max_voxels(1));
@@ -115,8 +118,8 @@ fn removed_voxels_no_longer_inflate_others() {
     assert_eq!(map.view().state_at([0.05, 3.05, 0.05]), LocalState::Occupied);
 }
 
-/// Algorithm 3, lines 3 and 10 add only occupied voxels to the history: those between occupied and free would never be
-/// removed, and line 9 would remove them from a history that does not contain them.
+/// The paper's Algorithm 3, lines 3 and 10 add only occupied voxels to the history: those between occupied and free
+/// would never be removed, and line 9 would remove them from a history that does not contain them.
 #[test]
 fn undecided_voxels_count_towards_the_limit_and_are_removed() {
     let mut unsure = parameters().with_max_voxels(10);

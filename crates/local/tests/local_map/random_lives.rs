@@ -40,7 +40,7 @@ fn the_map_equals_the_naive_one_while_parameters_change() {
         let mut parameters = at_once(LocalParameters::local_mapping());
         let mut map = LocalMap::new(0.1, parameters).unwrap();
         let mut naive = ReferenceLocal::new(0.1, parameters);
-        // Moves across page borders and across zero.
+        // The sensor moves across page borders and across index 0.
         let mut center = random.point([0.0, -6.4, 6.4], 1.0);
         for update in 0..40 {
             if random.below(3) == 0 {
@@ -100,7 +100,7 @@ fn a_change_with_a_work_limit_takes_several_updates_and_gives_the_same_map() {
         for update in 0.. {
             assert!(update < 2000, "the change never ends");
             if update == 3 || (update == 6 && seed % 2 == 0) {
-                // Also changes parameters while another change is being applied.
+                // Parameters also change while an earlier change is still being applied.
                 change(random, &mut parameters);
                 (parameters.inflation_radius_m, parameters.inflation_range_m) =
                     if update == 3 { (0.1, 3.0) } else { (0.3, f64::INFINITY) };
@@ -108,7 +108,7 @@ fn a_change_with_a_work_limit_takes_several_updates_and_gives_the_same_map() {
                 naive.parameters = parameters;
                 changed_at = update;
             }
-            // No new evidence: only the parameter change is left to apply.
+            // An empty scan adds no evidence, so the update only applies the change of parameters.
             let report = map.insert_scan(&super::scan([0.0; 3], &[])).unwrap();
             naive.insert_scan(&super::scan([0.0; 3], &[]));
             // A node is processed as a whole, so the limit can be exceeded by twice the voxels of a node.

@@ -55,8 +55,8 @@ fn readers_see_complete_updates_during_writes() {
                     assert!(view.update_number() >= last);
                     last = view.update_number();
                     views += 1;
-                    // A partial update would show as a difference from the counts, which are those of the complete
-                    // update.
+                    // The counts are those of the complete update, so a view of a partial update would differ from
+                    // them.
                     let states = states_of(&view);
                     let occupied = states.values().filter(|state| **state == LocalState::Occupied).count();
                     assert_eq!(occupied, view.occupied_voxels());

@@ -21,7 +21,7 @@ pub(super) fn export(export: &Export<'_>, format: OctreeFormat) -> anyhow::Resul
         let origin = origin.transpose()?.unwrap_or_default();
         let (region, memory_bytes) = (options.region.as_ref(), options.memory_bytes);
         let octree = OctreeExport { format, region, origin: origin.voxel, memory_bytes };
-        // Parts are kept in an unnamed file until all are known.
+        // The parts of the tree are spooled to an unnamed file until all of them are built.
         let mut spool = scratch_for(&options.output)?;
         let map = Stoppable::new(reader, export.watch.stop());
         let voxels = file.write(&origin, &grid, |mut out| map.write_octree(&octree, &mut spool, &mut out))?;

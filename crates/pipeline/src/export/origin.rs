@@ -27,7 +27,7 @@ impl ExportOrigin {
     pub fn near(requested_m: Point, grid: &Grid) -> Result<Self> {
         let units = grid.to_voxel_units(requested_m);
         let voxel = units.map(f64::round);
-        // False for NaN too.
+        // The comparisons are also false for NaN.
         let is_index = |x: &f64| *x >= f64::from(i32::MIN) && *x <= f64::from(i32::MAX);
         if !voxel.iter().all(is_index) {
             let reason = format!(

@@ -61,8 +61,8 @@ impl OriginFile {
         &self.path
     }
 
-    /// Writes the origin of a file that is about to be renamed into place. A reader that sees both in an intermediate
-    /// state can detect it by the hash.
+    /// Writes the companion file of an output that is about to be renamed into place. A reader that sees the new
+    /// companion file next to the old output detects this by the hash.
     pub fn write(
         &self,
         output: &Path,

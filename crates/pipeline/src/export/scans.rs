@@ -78,7 +78,7 @@ fn write_pose(scan: &KeptScan, is_stamped: bool, out: &mut impl Write) -> io::Re
     let [x, y, z] = scan.origin();
     let [qx, qy, qz, qw] = scan.world_from_sensor().map_or([0.0, 0.0, 0.0, 1.0], |pose| pose.quaternion());
     let stamp = decimal_seconds(stamp_ns);
-    // The shortest decimals that parse to the same bits.
+    // Rust formats an `f64` with the fewest digits that parse to the same bits.
     writeln!(out, "{stamp} {x} {y} {z} {qx} {qy} {qz} {qw}")
 }
 

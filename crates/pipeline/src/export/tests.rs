@@ -8,7 +8,7 @@ use voxtile_formats::write::{
     Origin, OutputFormat, OutputFormats, OutputOption, VoxelRow, VoxelSink, Writer,
 };
 
-/// A format that voxtile does not know: one line per voxel.
+/// A format of the caller, unknown to voxtile: one line per voxel.
 struct IndexSink<W> {
     out: W,
 }
@@ -57,7 +57,7 @@ fn options(output: &Path) -> ExportOptions {
 }
 
 #[test]
-fn a_new_row_adds_a_format() {
+fn formats_of_the_caller_can_be_exported() {
     let folder = tempfile::tempdir().unwrap();
     let lines = |name: &str, which| {
         let path = folder.path().join(name);

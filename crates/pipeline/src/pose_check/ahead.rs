@@ -11,9 +11,9 @@ use voxtile_formats::{PointBudget, ReadOptions};
 /// # Errors
 ///
 /// The poses do not fit the scans, or the input cannot be opened.
-pub fn check_ahead(scans: &Path, options: &ReadOptions, room: &PointBudget, watch: &Watch) -> Result<bool> {
+pub fn check_ahead(scans: &Path, options: &ReadOptions, budget: &PointBudget, watch: &Watch) -> Result<bool> {
     let may_be_read_twice = |path: &Path| path.is_file() || path.is_dir();
-    // `identity` is not a file.
+    // `poses` may be `identity`, which is not a file.
     let poses = options.poses.as_deref().filter(|path| path.exists());
     if !may_be_read_twice(scans) || !poses.is_none_or(may_be_read_twice) {
         return Ok(false);
@@ -21,7 +21,7 @@ pub fn check_ahead(scans: &Path, options: &ReadOptions, room: &PointBudget, watc
     let mut source = scan_input::open(scans, options, watch)?;
     let Some(mut check) = PoseCheck::of(options, &source.pose_source(), scans) else { return Ok(true) };
     while !check.is_done() && !watch.stop().is_set() {
-        let doubt = match source.next_stored(room) {
+        let doubt = match source.next_stored(budget) {
             Ok(Some(scan)) => check.take(&scan)?,
             Ok(None) => check.finish()?,
             Err(_) if source.pass_unread() => None,

@@ -10,7 +10,7 @@ const MAX_PICKS: usize = 10;
 /// Minimum motion between compared scans, in voxels or degrees. Scans closer together have nearly the same view.
 const STEP_VOXELS: f64 = 7.5;
 const STEP_DEGREES: f64 = 20.0;
-/// Edge of a voxel: a fraction of the median range, limited to a range in metres. Rooms give smaller voxels.
+/// Edge of a voxel as a fraction of the median range, clamped to limits in metres. Indoor scans give smaller voxels.
 const VOXEL_SHARE: f64 = 0.05;
 const VOXEL_M: [f64; 2] = [0.1, 0.4];
 /// Maximum number of points to use per scan.
@@ -24,15 +24,15 @@ const MAX_SCAN_POINTS: usize = 1 << 21;
 const ENOUGH: f64 = 0.75;
 /// Overlap that correct poses reach for nearby scans.
 const EXPECTED: f64 = 0.5;
-/// Factor by which the odds of the overlap must improve for another reading. In real data sets, correct poses always
-/// had better odds than other readings, and other readings of wrong poses improved the odds by a factor of at least
-/// 2.2.
+/// Factor by which another interpretation of the poses must improve the odds of the overlap to be reported. In real
+/// data sets, correct poses always had better odds than other interpretations; for wrong poses, the right
+/// interpretation improved the odds by a factor of at least 2.2.
 const BETTER_ODDS: f64 = 2.0;
-/// Readings within this difference are equivalent; the more likely one is preferred.
+/// Interpretations whose overlaps differ by at most this are equivalent; the more likely one is preferred.
 const TIE: f64 = 0.05;
-/// Overlap below which scans do not overlap, as if positions were in millimetres and read as metres.
+/// Overlap below which scans count as disjoint, for example because positions in millimetres were read as metres.
 const NO_OVERLAP: f64 = 0.2;
-/// Minimum improvement over the overlap without any motion.
+/// Minimum improvement over the overlap of the same scans without any motion.
 const THAN_STILL: f64 = 0.1;
 /// Limits for the speed of a sensor (m/s) and for the distance between stations (m).
 const TOO_FAST: f64 = 300.0;
@@ -179,7 +179,8 @@ impl PoseCheck {
         }))
     }
 
-    /// Excludes readings that cannot be concluded from overlap alone, because streets and plains look alike everywhere.
+    /// Returns whether an interpretation may be reported. For wrong units and the world frame, a better overlap is not
+    /// sufficient, because streets and plains look alike everywhere.
     fn is_plausible(&self, reading: Reading, given: f64, share: f64) -> Result<bool> {
         match reading {
             Reading::Millimetres | Reading::Centimetres => {
@@ -308,21 +309,21 @@ mod tests {
             .collect()
     }
 
-    /// Returns the doubt reported for scans with these poses.
+    /// Returns the remark of the check for scans with these poses.
     fn doubt_for(
         scan: impl Fn(usize) -> Vec<[f64; 3]>,
-        come: &[RigidPose],
+        poses: &[RigidPose],
         options: &ReadOptions,
         every_s: i64,
     ) -> Option<String> {
         let file = PoseSource::File("poses.txt".into());
         let mut check = PoseCheck::of(options, &file, Path::new("scans")).unwrap();
         let mut doubt = None;
-        for (number, come) in come.iter().enumerate() {
+        for (number, pose) in poses.iter().enumerate() {
             let mut points_in_sensor = PointStore::default();
             points_in_sensor.begin(false);
             scan(number).into_iter().for_each(|point| points_in_sensor.push(point, 0.0).unwrap());
-            let world_from_sensor = Pose::from_quaternion(come.position_m, come.quaternion).unwrap();
+            let world_from_sensor = Pose::from_quaternion(pose.position_m, pose.quaternion).unwrap();
             let stamp_ns = Some(1_000_000_000 * every_s * number as i64);
             let scan = StoredScan { name: String::new(), stamp_ns, points_in_sensor, world_from_sensor };
             doubt = doubt.or(check.take(&scan).unwrap());
@@ -372,7 +373,7 @@ mod tests {
         let in_world = |number: usize| scan(number).into_iter().map(|own| right[number].apply(own)).collect();
         let doubt_in_world = doubt_for(in_world, &right, &plain, 1).unwrap_or_default();
         assert!(doubt_in_world.contains("`world_frame`"), "{doubt_in_world}");
-        // The sensor's pose in the body is the same in all readings.
+        // The sensor's pose in the body is the same in all interpretations.
         let extrinsic = RigidPose { position_m: [0.1, 0.0, 0.2], quaternion: [0.0, 0.0, 1.0, 0.0] };
         let mut mounted = ReadOptions::default();
         mounted.clouds.body_from_sensor = extrinsic;
@@ -398,7 +399,7 @@ mod tests {
             let options = ReadOptions::default();
             assert_eq!(doubt_for(|_| ground.clone(), &trajectory(step_m), &options, 60), None, "{step_m}");
         }
-        // Wrong poses that cannot be detected.
+        // These poses are wrong, but that cannot be detected.
         let far: Vec<RigidPose> = trajectory(60.0).iter().map(RigidPose::inverse).collect();
         assert_eq!(doubt_for(|_| ground.clone(), &far, &ReadOptions::default(), 60), None);
         // A speed of 2 km/s is implausible.

@@ -3,7 +3,7 @@ use voxtile::Result;
 use voxtile::scan::Pose;
 use voxtile_formats::{PoseSource, RigidPose};
 
-/// Scan of the check: some of its points, and the body poses of the scan and its neighbours.
+/// Scan selected for the check: some of its points, and the body poses of the scan and its neighbours.
 pub(super) struct Pick {
     pub(super) points: Vec<[f32; 3]>,
     pub(super) stamp_ns: Option<i64>,
@@ -13,7 +13,7 @@ pub(super) struct Pick {
     pub(super) after: Option<RigidPose>,
 }
 
-/// Reading (interpretation) of poses.
+/// Interpretation of poses.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Reading {
     /// The poses as given.
@@ -41,7 +41,7 @@ pub(super) enum Reading {
 const CAMERA_FROM_LIDAR: RigidPose = RigidPose { position_m: [0.0; 3], quaternion: [0.5, -0.5, 0.5, 0.5] };
 
 impl Reading {
-    /// Returns the alternative readings for poses from this source.
+    /// Returns the other interpretations to try for poses from this source.
     pub(super) fn others(source: &PoseSource, has_calib: bool) -> Vec<Self> {
         let any = [Self::Inverse, Self::Next, Self::Previous];
         let own: &[Self] = match source {
@@ -62,7 +62,7 @@ impl Reading {
         any.into_iter().chain(own.iter().copied()).collect()
     }
 
-    /// Returns the points of a scan at their pose by this reading.
+    /// Returns the points of a scan with their pose under this interpretation.
     pub(super) fn place<'p>(self, pick: &'p Pick, mount: &RigidPose) -> Result<Placed<'p>> {
         let body = self.body(pick);
         let (frame, sensor) = match self {

@@ -32,11 +32,11 @@ pub(super) struct Cell {
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(super) struct Cells {
     pub(super) cells: Vec<Cell>,
-    /// Last scan that may have changed them; 0 if unknown.
+    /// Number of the last scan that may have changed these voxels; 0 if unknown.
     pub(super) last_scan: u64,
 }
 
-/// Linear scale of the values in log-odds.
+/// Linear mapping of log-odds from `least` to `most` to values from 0 to 255.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Scale {
     pub(super) least: f64,
@@ -44,7 +44,8 @@ pub(super) struct Scale {
 }
 
 impl Scale {
-    /// Returns the scale for a kind of voxels: from the threshold to the clamp on its side.
+    /// Returns the scale for a kind of voxels: from the occupancy threshold to the maximum log-odds for occupied
+    /// voxels, from the minimum to the threshold for others.
     pub(super) fn of(config: &MapConfig, kind: Kind) -> Self {
         let [min, max] = config.sensor_model.limits();
         let threshold = config.occupied_log_odds();
@@ -142,7 +143,7 @@ impl Cells {
         nodes
     }
 
-    /// Adds the voxels of a child node. Each maps to a coarser voxel, which keeps the maximum value. Call
+    /// Adds the voxels of a child node. Each maps to one or two coarser voxels, which keep the maximum value. Call
     /// [`Cells::sort`] after the last child.
     pub(super) fn add_child(&mut self, scheme: Scheme, own: NodeKey, child: NodeKey, cells: &Self) {
         let (from, first, edges) = (scheme.first_voxel(child), scheme.first_voxel(own), scheme.edges(own));
@@ -150,7 +151,8 @@ impl Cells {
         for cell in &cells.cells {
             let at = axes(cell.place);
             let low = [0, 1, 2].map(|k| from[k] - first[k] + (at[k] << child.level));
-            // One coarser voxel, or two at the edge of a tile whose size is not a multiple of theirs.
+            // The fine voxel is in one coarser voxel, or in two if the tile's size is not a multiple of the coarser
+            // voxel's size.
             let [xs, ys, zs] = [0, 1, 2].map(|k| {
                 let last = ((low[k] + width - 1) >> own.level).min(edges[k] - 1);
                 (low[k] >> own.level)..=last

@@ -17,7 +17,7 @@ pub struct Difference<'a, V> {
 }
 
 impl<'a, V: MapView> Difference<'a, V> {
-    /// Compares two states, each with its map.
+    /// Creates the difference of two states. Each state is given by its levels and its map, from which tiles are read.
     ///
     /// # Errors
     ///
@@ -77,7 +77,7 @@ fn compared(before: &Cells, after: &Cells) -> Cells {
 
 impl<V: MapView> TilesetNodes for Difference<'_, V> {
     fn tops(&self) -> Vec<NodeKey> {
-        // The states may begin at different levels: the coarser ones cover the others.
+        // The coarsest nodes of the two states may have different levels. Return all at the coarser level.
         let (before, after) = (self.before.tops(), self.after.tops());
         let level = before.iter().chain(&after).map(|key| key.level).max().unwrap_or(0);
         let lifted = before.into_iter().chain(after).map(|mut key| {

@@ -32,7 +32,7 @@ use voxtile::{Error, Result};
 pub struct Levels {
     config: MapConfig,
     pub(super) scheme: Scheme,
-    /// From the tile level up. Nodes without occupied voxels are included only if a sibling has some.
+    /// Nodes at the level of tiles and coarser. Nodes without occupied voxels are included only if a sibling has some.
     nodes: FxHashMap<NodeKey, Node>,
     tops: Vec<NodeKey>,
     /// Bounds of all tiles.
@@ -57,14 +57,14 @@ const NODE_FORMAT: u64 = 1;
 const MAX_TOP_VOXELS: u64 = 4096;
 
 impl Levels {
-    /// Builds the coarse nodes of these tiles that the store lacks, on all cores. `progress` receives the number of
-    /// tiles read since its last call; if it returns `false`, the build stops and returns `None`. Nodes built until
+    /// Builds those coarse nodes of the given tiles that the store lacks, on all cores. `progress` receives the number
+    /// of tiles read since its last call; if it returns `false`, the build stops and returns `None`. Nodes built until
     /// then remain in the store.
     ///
     /// Damaged tiles are skipped and listed by [`Levels::unreadable`].
     ///
     /// Nodes are identified by the versions of their tiles. Tiles of OctoMap files and of maps without a log have no
-    /// versions: for these, `origin` must be different for each map and each state of it.
+    /// versions. For these, pass a different `origin` for each map and for each state of a map.
     ///
     /// Memory: about sixty bytes per tile, and a few tiles per thread.
     ///
@@ -182,7 +182,7 @@ impl Levels {
         }
     }
 
-    /// Removes free tiles without an occupied sibling, which no viewer needs.
+    /// Removes nodes if neither they nor their siblings have occupied voxels; no viewer requests them.
     fn remove_empty_regions(&mut self) {
         let parents: FxHashMap<NodeKey, bool> =
             self.nodes.iter().map(|(&key, node)| (key, node.is_occupied)).collect();
@@ -236,7 +236,7 @@ impl Levels {
         match (kept.map(|bytes| node_bytes::decode(&bytes)), tile) {
             (Some(Ok(cells)), _) => Ok(cells),
             (_, Some(tile)) => self.cells_of_tile(map, key, tile, Kind::Occupied),
-            // A stored node may be damaged: build it again.
+            // The store lacks the node, or the stored bytes are damaged: build it again.
             _ => {
                 let cells = self.pooled(map, store, key)?;
                 Ok(Cells { last_scan: node.last_scan, ..cells })
@@ -323,7 +323,7 @@ impl Levels {
         Ok(Some(node_bytes::encode(&head, &cells)))
     }
 
-    /// Returns the positions of the occupied voxels of a node, from its lower corner, in voxels of
+    /// Returns the positions of the occupied voxels of a node, relative to its lower corner, in units of
     /// [`Levels::voxel_edge_m`].
     ///
     /// # Errors
@@ -352,7 +352,7 @@ impl Levels {
         keys
     }
 
-    /// Returns the nodes inside a tile, including the tile, if the tile is divided; otherwise none.
+    /// If a tile is divided, returns the tile and the nodes inside it; otherwise no nodes.
     ///
     /// # Errors
     ///
@@ -364,7 +364,7 @@ impl Levels {
         }
     }
 
-    /// Returns the blocks of a tile with occupied voxels at every level.
+    /// Returns the blocks of a tile, at all levels, that have occupied voxels.
     pub(super) fn blocks_of_tile<V: MapView>(
         &self,
         map: &V,
@@ -426,7 +426,8 @@ impl Levels {
         self.nodes.keys().filter(|key| key.level == self.scheme.tile_level()).count()
     }
 
-    /// Returns the properties of a node. A node above the coarsest level represents those below it.
+    /// Returns the properties of a node. For a key above the coarsest level, combines those of the coarsest nodes below
+    /// it.
     pub(super) fn get(&self, key: NodeKey) -> Option<Node> {
         let top_level = self.tops.first().map_or(MAX_LEVEL, |top| top.level);
         if key.level <= top_level {
@@ -453,7 +454,7 @@ impl Levels {
             None => [[0; 3], self.scheme.edges(key).map(|edge| (edge - 1).clamp(0, 255) as u8)],
         };
         let [min, max] = node_bytes::bounds_m(&head, bounds);
-        // Coarse voxels may extend beyond the tiles.
+        // Clip the box, because coarse voxels may extend beyond the tiles.
         let Some(tiles) = self.tile_box else { return Aabb { min, max } };
         let edge_m = self.config.grid.tile_size_m();
         let (low, high) = (tiles.min().to_array(), tiles.max().to_array());

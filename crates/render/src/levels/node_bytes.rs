@@ -105,7 +105,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn nodes_come_back() {
+    fn decoded_voxels_equal_the_encoded_ones() {
         let places = [0, 0x0000_007f, 0x0001_0000, 0x007f_7f7f];
         let cells = places.map(|place| Cell { place, value: place as u8, count: 7 }).to_vec();
         let cells = Cells { cells, last_scan: 12 };

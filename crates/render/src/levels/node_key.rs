@@ -51,7 +51,7 @@ impl FromStr for NodeKey {
             *k = next()?.parse().map_err(|_| ())?;
         }
         let key = Self { level, index };
-        // Each node has only one name, without signs or leading zeros.
+        // Accept only the canonical text of a node: no plus sign, leading zero or `-0`.
         if parts.next().is_some() || level > MAX_LEVEL || key.to_string() != text { Err(()) } else { Ok(key) }
     }
 }

@@ -32,15 +32,15 @@ pub struct NodeStore {
 type Nodes = FxHashMap<(NodeKey, u64), Stored>;
 
 struct Spool {
-    file: Box<dyn Reopenable>,
+    file: Box<dyn NodeFile>,
     end: u64,
     limit: Option<Limit>,
 }
 
-/// File that may be reopened later.
-trait Reopenable: Read + Write + Seek + Send {}
+/// Any file or buffer in which nodes can be stored.
+trait NodeFile: Read + Write + Seek + Send {}
 
-impl<T: Read + Write + Seek + Send> Reopenable for T {}
+impl<T: Read + Write + Seek + Send> NodeFile for T {}
 
 /// Maximum length of the file, and a function that empties it.
 struct Limit {
@@ -162,7 +162,8 @@ impl NodeStore {
     }
 }
 
-/// Reads the index of a file. Returns the nodes before the first incomplete record, and the end of the last one.
+/// Reads the index of a file. Returns the nodes before the first incomplete record, and the end of the last complete
+/// one.
 fn read_all(file: &mut (impl Read + Seek)) -> io::Result<(Nodes, u64)> {
     let mut nodes = Nodes::default();
     let length = file.seek(SeekFrom::End(0))?;
@@ -245,7 +246,7 @@ mod tests {
         for number in 0..100 {
             let bytes = vec![number as u8; 100 + number as usize];
             store.put(key_of(number), 7, &bytes, [[0; 3]; 2], 1).unwrap();
-            // The latest node is present, whatever was removed.
+            // The latest node is present even if the file was restarted.
             assert_eq!(store.get(key_of(number), 7).unwrap(), Some(bytes));
             assert!(store.bytes() <= MOST && std::fs::metadata(&path).unwrap().len() <= MOST, "{number}");
         }

@@ -3,8 +3,8 @@ use voxtile::space::{Grid, TileIndex};
 
 /// Division of the voxels of a map into nodes.
 ///
-/// From [`Scheme::tile_level`] up, a node covers `2^k` tiles along each axis. Below, it is a block of 128 voxels in a
-/// tile; the last one along an axis may be smaller.
+/// From [`Scheme::tile_level`] up, a node covers `2^k` tiles along each axis. Below, a node is a block of a tile, of
+/// 128 voxels along each axis; the last block along an axis may be smaller.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Scheme {
     /// Voxels along the edge of a tile.
@@ -51,7 +51,7 @@ impl Scheme {
         keys
     }
 
-    /// Returns the node of a level that contains a voxel of a tile, and the position in the node.
+    /// Returns the node of a level that contains a voxel of a tile, and the voxel's position in this node.
     pub(super) fn node_of_voxel(self, tile: TileIndex, voxel: [i32; 3], level: u8) -> (NodeKey, [i64; 3]) {
         let index = tile.to_array();
         let own = [0, 1, 2].map(|k| (i64::from(voxel[k]) - i64::from(index[k]) * self.tile_edge) >> level);
@@ -72,7 +72,7 @@ impl Scheme {
         }
     }
 
-    /// Returns the number of voxels of the node's size along each edge; 0 or less for blocks outside the tile.
+    /// Returns the number of the node's voxels along each axis; 0 or less for blocks outside the tile.
     pub(super) fn edges(self, key: NodeKey) -> [i64; 3] {
         match self.tile_level.checked_sub(key.level) {
             Some(finer) => key.index.map(|k| {

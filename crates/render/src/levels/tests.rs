@@ -65,7 +65,8 @@ fn levels_of(map: &InMemoryMapper, store: &NodeStore) -> Levels {
     Levels::build(map, &map.tile_indices(), 0, store, &|_| true).unwrap().unwrap()
 }
 
-/// Returns the voxels of a node by the map's indices: the lowest voxel of each cell.
+/// Returns the values of the voxels of a node. The key is the index of the lowest voxel of the map that the voxel
+/// covers.
 fn voxels_of(
     levels: &Levels,
     map: &InMemoryMapper,
@@ -132,7 +133,7 @@ proptest! {
             let voxels = voxels_of(&levels, &map, &store, key);
             let bounds = levels.bounds_m(&store, key);
             for voxel in voxels.keys() {
-                // Part of a coarse voxel inside the tiles of the map.
+                // Bounds are clipped to the tiles of the map, so a coarse voxel may be only partly inside.
                 let low = voxel.map(|at| 0.5 * at as f64);
                 let high = voxel.map(|at| 0.5 * (at + (1 << key.level)) as f64);
                 prop_assert!((0..3).all(|k| bounds.min[k] < high[k] && low[k] < bounds.max[k]));
@@ -152,7 +153,8 @@ proptest! {
             for (voxel, value) in &voxels {
                 let within = |fine: &[i64; 3]| (0..3).all(|k| (voxel[k]..voxel[k] + width).contains(&fine[k]));
                 let most = finest.iter().filter(|(fine, _)| within(fine)).map(|(_, value)| value).max();
-                // At the edge of a tile whose size is not a multiple, a voxel may have the value of its neighbour.
+                // If the tile's size is not a multiple of the voxel's size, the last voxel may have the value of its
+                // neighbour.
                 prop_assert!(most == Some(value) || edge == 333, "level {level}, {voxel:?}: {value}, not {most:?}");
             }
             for fine in &wanted {
@@ -193,7 +195,7 @@ proptest! {
         let (before, after) = (map_of(edge, &first), map_of(edge, &second));
         let (old_store, store) = (memory_store(), memory_store());
         let (old, new) = (levels_of(&before, &old_store), levels_of(&after, &store));
-        // A shared store would need versions.
+        // The tiles have no versions, so the two maps need separate stores.
         let difference = Difference::new((&old, &before), (&new, &after)).unwrap();
         let mut found = BTreeMap::new();
         for tile in before.tile_indices().into_iter().chain(after.tile_indices()) {
@@ -288,7 +290,7 @@ fn invalid_keys_are_refused() {
     assert!(key.children().all(|child| child.parent() == key));
 }
 
-/// Such tiles have no versions: stores and browsers must not mix nodes of two maps.
+/// Tiles of in-memory maps have no versions. Stores and browsers must not mix nodes of two such maps.
 #[test]
 fn nodes_of_tiles_without_versions_differ_by_origin() {
     let (one, other) = (map_of(8, &[[1.0; 3]]), map_of(8, &[[2.0; 3]]));

@@ -152,7 +152,7 @@ impl Writer<'_> {
             None => self.nodes.version(key),
         }
         .unwrap_or_default();
-        // File names contain no question mark.
+        // Meshes are files, and file names contain no question mark.
         let version = match self.content {
             TilesetContent::Voxels => format!("?v={version:016x}"),
             TilesetContent::Meshes => String::new(),

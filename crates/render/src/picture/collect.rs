@@ -15,7 +15,7 @@ pub(super) enum Source<'a> {
     Two { before: &'a dyn MapView, after: &'a dyn MapView },
 }
 
-/// Cells of a picture, and the known part of them.
+/// Result of reading the tiles of a picture.
 pub(super) struct Collected {
     /// `None` if no voxel was observed.
     pub known: Option<Known>,
@@ -37,13 +37,12 @@ pub(super) struct Known {
 const MAX_TILES_READ_TWICE: usize = 4096;
 
 impl Collected {
-    /// Reads all tiles. If the known area is much smaller than its tiles, so that cells can be finer, reads them once
-    /// more.
+    /// Reads all tiles. If the observed area is so small that cells can be finer, reads the tiles a second time.
     pub fn of(picture: &Picture, source: Source, progress: &(dyn Fn(u64, u64) + Sync)) -> Result<Self> {
         let mut collector = Collector { picture, source, grid: source.grid(), unread: Mutex::default() };
         let tiles = collector.tiles();
         let done =
-            Progress { done: AtomicU64::new(0), all: AtomicU64::new(tiles.len() as u64), tell: progress };
+            Progress { done: AtomicU64::new(0), all: AtomicU64::new(tiles.len() as u64), report: progress };
         let mut known = None;
         if let Some(voxels) = collector.bounds(&tiles) {
             known = collector.collect(&tiles, voxels, &done)?;
@@ -72,13 +71,13 @@ impl Collected {
 struct Progress<'a> {
     done: AtomicU64,
     all: AtomicU64,
-    tell: &'a (dyn Fn(u64, u64) + Sync),
+    report: &'a (dyn Fn(u64, u64) + Sync),
 }
 
 impl Progress<'_> {
     fn step(&self) {
         let done = 1 + self.done.fetch_add(1, Ordering::Relaxed);
-        (self.tell)(done, self.all.load(Ordering::Relaxed));
+        (self.report)(done, self.all.load(Ordering::Relaxed));
     }
 }
 
@@ -210,7 +209,8 @@ impl Collector<'_> {
                     continue;
                 }
                 let here = voxel.evidence.log_odds >= occupied_from[side];
-                // A free voxel here is in the other side's list if it is occupied there.
+                // A free voxel that is occupied on the other side is added again, as occupied, with the voxels of that
+                // side.
                 let rank = match (here, here && is_occupied(1 - side, voxel.index)) {
                     (false, _) => Rank::Free,
                     (true, true) => Rank::Changed(Change::Same),

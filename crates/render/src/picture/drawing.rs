@@ -169,7 +169,8 @@ impl<'a> Drawing<'a> {
         }
     }
 
-    /// Returns the values of the first and the last color: one cell in a hundred may be outside at either end.
+    /// Returns the values of the first and the last color. Up to 1 % of the cells at either end may be outside the
+    /// range.
     ///
     /// Probabilities always have the same range, so that pictures can be compared.
     fn range(&self) -> Option<[f64; 2]> {
@@ -225,7 +226,8 @@ impl<'a> Drawing<'a> {
         }
     }
 
-    /// Shading by light from the upper left: edges towards the light are brighter, edges away from it are darker.
+    /// Returns the brightness factor of a cell for light from the upper left: brighter if the cell rises above its left
+    /// and upper neighbours, darker if it lies below them.
     fn light(&self, known: &Known, [across, up]: [usize; 2], near: i32) -> f64 {
         let rise_m = |at: [usize; 2]| {
             let other = known.cell(at);
@@ -283,7 +285,7 @@ impl<'a> Drawing<'a> {
             positions.first().and_then(|&at| pane.pixel_of(at)).into_iter().collect();
         for pair in positions.windows(2) {
             let length = length(pair);
-            // One step per pixel, at most the longest line inside the picture.
+            // One step per pixel. The bound is longer than any line inside the picture.
             let parts =
                 (length * pane.zoom as f64).ceil().clamp(1.0, 4.0 * super::options::MAX_PX as f64) as usize;
             let parts = if length <= longest { parts } else { 1 };
@@ -297,11 +299,11 @@ impl<'a> Drawing<'a> {
                 }
             }
         }
-        // Draw each pixel once: a sensor at rest all day costs no more.
+        // Draw each pixel once, even if the sensor was at rest there for hours.
         middles.sort_unstable();
         middles.dedup();
         let pixels_a_metre = pane.zoom as f64 / (known.frame.voxels_a_cell as f64 * resolution_m);
-        // As wide as a street lane, because more would hide the streets of a large map.
+        // A radius of 0.2 m, limited to a few pixels: a wider line would hide the streets of a large map.
         let most = if self.picture.has_legend { dot + 1 } else { 1 };
         let radius = ((0.2 * pixels_a_metre) as usize).clamp(usize::from(self.picture.has_legend), most);
         let color = if self.collected.is_difference { palette::INK } else { palette::PATH };

@@ -46,7 +46,7 @@ impl Frame {
         for (k, axis) in self.view.axes().into_iter().enumerate() {
             let from = i64::from(self.voxels.min[axis]) + first[k] as i64 * self.voxels_a_cell;
             let end = from + cells[k] as i64 * self.voxels_a_cell;
-            // Both are in a box with 32-bit indices.
+            // The bounds are inside a box with 32-bit indices.
             voxels.min[axis] = from.min(i64::from(i32::MAX)) as i32;
             voxels.end[axis] = end.min(i64::from(self.voxels.end[axis])) as i32;
         }

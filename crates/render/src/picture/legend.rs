@@ -62,7 +62,7 @@ impl Legend {
         let right = canvas.width() - margin;
         let bar = self.bar_width(canvas.width(), dot);
         self.draw_scale(canvas, [right, bar], foot, dot);
-        // Not occupied.
+        // Colors of free and unknown space.
         let swatch = right.saturating_sub(bar + 74 * dot);
         for (top, color, label) in
             [(foot + 4 * dot, palette::FREE, "free"), (line, palette::UNKNOWN, "unknown")]

@@ -21,7 +21,7 @@ pub struct Picture {
     pub(super) skips_unreadable: bool,
 }
 
-/// Maximum number of pixels along an edge, which needs 1.2 GB.
+/// Maximum number of pixels along an edge. A picture of this size needs 1.2 GB.
 pub(super) const MAX_PX: usize = 8192;
 
 impl Default for Picture {

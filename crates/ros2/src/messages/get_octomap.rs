@@ -14,7 +14,7 @@ pub struct OctomapInBoxRequest {
     /// Corners in metres.
     pub min: [f64; 3],
     pub max: [f64; 3],
-    /// Whether nodes are free or occupied; otherwise they have log-odds.
+    /// True for nodes that are free or occupied, false for nodes with log-odds.
     pub binary: bool,
 }
 

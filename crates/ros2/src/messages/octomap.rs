@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct Octomap {
     pub header: Header,
-    /// Whether nodes are free or occupied (`.bt`) or have log-odds (`.ot`).
+    /// True if nodes are free or occupied (`.bt`), false if they have log-odds (`.ot`).
     pub binary: bool,
     /// Class name of the tree in OctoMap.
     pub id: String,

@@ -29,7 +29,7 @@ pub struct PointCloud2 {
 const FLOAT32: u8 = 7;
 const UINT8: u8 = 2;
 const STEP: u32 = 12;
-/// Point step with the field `state`, padded to alignment.
+/// Bytes per point of clouds with the field `state`, padded to alignment.
 const STEP_WITH_STATE: u32 = 16;
 
 impl PointCloud2 {

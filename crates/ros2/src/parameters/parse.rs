@@ -44,10 +44,10 @@ pub fn parse(arguments: &[OsString]) -> Result<Args, Error> {
     Ok(args)
 }
 
-/// Returns the fields that files and parameters set; the last value of each.
+/// Returns the fields that files and parameters set. If several set a field, the last value counts.
 fn given_by(arguments: &[OsString], parameters: Vec<[String; 2]>) -> Result<BTreeMap<String, Given>, Error> {
     let mut given = BTreeMap::new();
-    // Other errors of the command line are reported by the second parse.
+    // If this parse fails, the later complete parse of the command line reports the error.
     let Ok(named) = Args::command().ignore_errors(true).try_get_matches_from(arguments) else {
         return Ok(given);
     };

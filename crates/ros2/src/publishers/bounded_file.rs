@@ -4,7 +4,7 @@ use std::io::{self, Cursor, Error, ErrorKind, Read, Seek, SeekFrom, Write};
 #[derive(Debug, Default)]
 pub struct BoundedFile(Cursor<Vec<u8>>);
 
-/// Larger messages are not delivered over DDS.
+/// Maximum size of a message: larger ones are not delivered over DDS.
 const MAX_BYTES: usize = 64 << 20;
 
 impl BoundedFile {

@@ -3,7 +3,7 @@ use crate::live_map::MapVersion;
 use std::time::{Duration, Instant};
 use voxtile::VoxelIndex;
 
-/// The changes that subscribers have received, and those to send next.
+/// Tracks which changes subscribers have received, and which to send next.
 #[derive(Debug)]
 pub struct Viewers {
     count: usize,

@@ -25,7 +25,7 @@ impl Process {
 
 impl Drop for Process {
     fn drop(&mut self) {
-        // It may have exited already.
+        // Ignore an error: the process may have exited already.
         let _ = self.0.kill();
         let _ = self.0.wait();
     }

@@ -17,7 +17,8 @@ impl Faces {
     }
 }
 
-/// Returns a code's bits of one axis, decremented and incremented; `None` outside the cube.
+/// Returns the bits of one axis of a code, decremented and incremented. An element is `None` if it would be outside of
+/// the cube.
 fn axis_neighbors(code: u64, axis: usize, levels: u32) -> [Option<u64>; 2] {
     let axis_bits = (X_BITS << axis) & ((1 << (3 * levels)) - 1);
     let part = code & axis_bits;

@@ -211,7 +211,7 @@ pub(super) fn put_range(bytes: &mut Vec<u8>, range: SetRange) {
     put_tile(bytes, TileIndex::default(), range.first.tile);
     put_number(bytes, range.first.code);
     put_tile(bytes, range.first.tile, range.last.tile);
-    // Ranges often end at the last code of a tile, which is stored as 0.
+    // Stored as the distance from the last code of a tile: most ranges end there, and 0 takes one byte.
     put_number(bytes, super::super::set_range::LAST_CODE - range.last.code);
 }
 

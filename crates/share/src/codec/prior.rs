@@ -17,7 +17,7 @@ pub(super) static PRIOR: &[u8; CONTEXTS] = include_bytes!("prior.bin");
 /// As for [`encode_updates`](super::encode_updates).
 pub fn count_contexts(updates: &[Update], counts: &mut [[u64; 2]]) -> Result<()> {
     let cube = Cube::of(updates)?;
-    // A counter cannot fail.
+    // Cannot fail, because `Counter` returns no errors.
     let _ = cube.walk(&mut Counter(counts));
     Ok(())
 }

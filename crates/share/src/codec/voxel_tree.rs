@@ -146,7 +146,7 @@ fn walk(
     for level in (0..levels).rev() {
         let mut children = Vec::with_capacity(2 * nodes.len());
         let mut masks = Vec::with_capacity(nodes.len());
-        // For a writer: the voxels of the remaining nodes.
+        // Only for a writer: the voxels of the nodes that are not yet written.
         let mut rest = known;
         for number in 0..nodes.len() {
             let wanted = take_mask(&mut rest, nodes[number], level);

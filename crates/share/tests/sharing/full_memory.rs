@@ -6,7 +6,7 @@ use voxtile_share::codec::{Header, Packet, Request, Status, Update};
 use voxtile_share::{Receivers, Sender, SenderConfig};
 use voxtile_simulation::Random;
 
-/// Large enough that the reserve for one packet is less than a tenth of it.
+/// Memory limit in bytes, large enough that the reserve for one packet is less than a tenth of it.
 const MEMORY: usize = 256 << 20;
 const HOSTILE: u8 = 6;
 const HONEST: u8 = 0;

@@ -83,7 +83,7 @@ fn voxels_cleared_by_rays_without_a_return_leave_the_set() {
     }
 }
 
-/// A voxel leaves the map by age, while the rays of skipped points pass it.
+/// A voxel leaves the map because of the maximum number of voxels, while the rays of skipped points pass it.
 #[test]
 fn rays_of_skipped_points_do_not_clear_shared_voxels() {
     // The map skips voxels near the end of the index range.

@@ -95,7 +95,7 @@ fn hostile_robots_stay_within_the_limit_and_take_nothing_from_others() {
     const MEMORY: usize = Receivers::<u8>::MIN_BYTES;
     for seed in 0..2 {
         let mut receivers = Receivers::new(MEMORY).unwrap();
-        // The limit without the reserve for one packet.
+        // Memory limit of all receivers, without the reserve for one packet.
         let all = receivers.free_bytes();
         (0..3).for_each(|robot| receivers.insert(robot, config(seed + u64::from(robot)), None));
         let mut honest = Sender::new(grid(), 1, SenderConfig::default()).unwrap();
@@ -165,7 +165,7 @@ fn the_largest_layer_shrinks_for_a_new_robot() {
     let (first, second) = (receivers.get(&0).unwrap(), receivers.get(&1).unwrap());
     assert!(second.is_converged() && second.layer().unwrap().len() == 30_000, "{:?}", second.counts());
     assert!(first.is_over_limit() && first.counts().cut_voxels > 0, "{:?}", first.counts());
-    // No more was cut than needed.
+    // No more voxels were removed than necessary.
     let all = receivers.memory_bytes();
     assert!(first.memory_bytes() >= receivers.part_bytes() && all > 2 * receivers.part_bytes() - (1 << 20));
 }

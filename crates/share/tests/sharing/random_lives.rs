@@ -119,7 +119,7 @@ impl World {
     /// Compares all sets with the expected set, by voxels and by digest.
     fn check(&mut self) {
         let sent: BTreeSet<VoxelIndex> = self.sender.sent().iter().collect();
-        // Without `assert_eq!`, which would print thousands of voxels.
+        // `assert!` instead of `assert_eq!`, which would print thousands of voxels.
         assert!(sent == self.model);
         let digest = self.sender.sent().digest();
         for end in &mut self.receivers {

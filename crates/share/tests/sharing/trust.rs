@@ -121,7 +121,7 @@ fn requests_beyond_the_rate_limit_are_not_answered() {
         .flat_map(|_| pair.sender.answer(2, &request.encode(), now).unwrap())
         .map(|packet| packet.bytes.len())
         .sum();
-    // The bytes of one second, and the answer that exceeded them.
+    // The limit is the bytes of one second, plus the answer that exceeded them.
     assert!(answered <= (256 << 10) + 16 * 1200, "{answered} bytes at once");
     assert!(pair.sender.counts().refused_asks > 900);
 }
@@ -146,7 +146,7 @@ fn a_flood_of_requests_is_answered_at_the_allowed_rate() {
                 .map(|packet| packet.bytes.len() as u64)
                 .sum::<u64>();
         }
-        // The bucket was full, so three seconds of the rate were available.
+        // The bucket was full at the start, so the bytes of three seconds were available in two seconds.
         let range = 3 * PER_SECOND - ANSWER..=3 * PER_SECOND + ANSWER;
         assert!(range.contains(&bytes), "{bytes} bytes, one request per {interval_us} us");
     }
@@ -166,6 +166,6 @@ fn digests_of_very_many_tiles_are_answered_less_often() {
     };
     let (few, many) = (answered(2000), answered(40_000));
     assert!(few > 100, "{few}");
-    // Each request costs 10 kB in addition to the bytes sent.
+    // Each request counts as 10 kB, in addition to the bytes of its answer.
     assert!((15..=27).contains(&many), "{many}");
 }

@@ -100,7 +100,8 @@ export class Browser {
     try {
       rmSync(this.profile, { recursive: true, force: true, maxRetries: 10, retryDelay: 200 });
     } catch {
-      // Processes of Chromium that end later may still write there: the system removes the rest.
+      // Child processes of Chromium may still write to the profile folder. It is in the temporary folder, so the system
+      // removes it later.
     }
   }
 }

@@ -234,7 +234,7 @@ try {
   run('snapshot', map, 'monday', '--delete');
   await browser.until(isShown('0', '1'), 60);
   await follows(map, other);
-  // Both at once: the event of the first does not include the second.
+  // Both maps are extended concurrently. The event for one map does not report the other.
   const grown = [scan(5), scan(6)];
   await Promise.all([map, other].map((one, k) => new Promise((resolve, reject) => {
     const build = spawn(voxtile, ['build', grown[k], '-o', one, '--append', '-q'], { stdio: ['ignore', 'ignore', 'inherit'] });
@@ -259,7 +259,7 @@ try {
     await browser.ready(300);
     const [calls, bytes] = [await browser.value('voxtile.drawCalls()'), await browser.value('voxtile.bytes()')];
     assert.ok(calls <= 200 && bytes <= 256 * 2 ** 20);
-    // Also not in between.
+    // The limit of draw calls also holds while the map is loaded.
     const most = await browser.value('voxtile.mostDrawCalls()');
     assert.ok(most >= calls && most <= 200, `${most} draw calls`);
     const { tiles } = await maps();

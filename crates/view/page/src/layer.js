@@ -25,7 +25,7 @@ export class Layer {
     this.material = makeMaterial(kind, viewer.shared);
     this.materials = { free: makeMaterial(KIND.free, viewer.shared), unknown: makeMaterial(KIND.unknown, viewer.shared) };
     if (hue) tintLayer(this.material, hue);
-    // By URL: a mesh, or its pending load.
+    // Free and unknown voxels by URL: a mesh, or a load in progress.
     this.extra = new Map();
     // URLs of free and unknown voxels that failed to load.
     this.lostNear = new Set();
@@ -72,7 +72,7 @@ export class Layer {
     if (tile) {
       tiles.lost.add(tile);
     } else if (isNext) {
-      // Otherwise it would never be complete and would delay later updates.
+      // Drop the next state: without its root it would never be complete, and later updates would wait for it.
       this.close(tiles);
       [this.next, this.again, this.isBehind] = [null, false, true];
     }
@@ -124,7 +124,7 @@ export class Layer {
       if (!tiles) continue;
       tiles.setResolutionFromRenderer(camera, renderer);
       tiles.update();
-      // A loaded file requests others at the next update.
+      // Counts updates without pending requests: a file that was just loaded requests others only at the next update.
       tiles.calm = tiles.rootTileset && Layer.isIdle(tiles) ? (tiles.calm ?? 0) + 1 : 0;
     }
     if (this.next && Layer.isQuiet(this.next)) {
@@ -142,7 +142,7 @@ export class Layer {
     this.adapt();
   }
 
-  // Keeps draw calls and memory within limits by selecting coarser levels; `adapts` until stable.
+  // Keeps draw calls and memory within limits by selecting coarser levels; `adapts` is true until the level is stable.
   adapt() {
     const { tiles, viewer } = this;
     const opened = viewer.layers.reduce((sum, layer) => sum + (layer.next ? 2 : 1), 0);

@@ -43,7 +43,8 @@ let pathNumber = 0;
 const CUTS = ['x0', 'x1', 'y0', 'y1', 'z0', 'z1'];
 const OPEN = ['0', '1000', '0', '1000', '0', '1000'];
 
-// The names are those of the first map. A map without a snapshot of this name is shown in its current state.
+// The page lists the snapshots of the first map. A map without a snapshot of the chosen name is shown in its current
+// state.
 const idOf = (map) => {
   const [at, since] = ['snapshot', 'since'].map((id) => $(id).value)
     .map((chosen) => map.snapshots.some(({ name }) => name === chosen) && chosen);
@@ -316,7 +317,7 @@ window.addEventListener('hashchange', () => {
 // --- Live
 
 const RETRY_MS = 1000;
-// Latest generation of each map by server: another server restarts at 0.
+// Latest generation of each map, as reported by the server. A restarted server counts from 0 again.
 const latest = new Map();
 let lastServer = null;
 let events = null;
@@ -325,7 +326,7 @@ let isChanging = false;
 const isBehind = (layer) => latest.has(layer.map.id) && layer.generation !== latest.get(layer.map.id);
 const record = (id, generation) => { if (generation > 0) latest.set(id, Math.max(generation, latest.get(id) ?? 0)); };
 
-// One change at a time: each reads the state of all maps.
+// Loads one change at a time, because each load reads the state of all maps.
 async function catchUp() {
   if (isChanging || !viewer.layers.some(isBehind)) return;
   isChanging = true;
@@ -359,7 +360,7 @@ async function change() {
   const changed = before.filter((was) => maps.some(({ id, generation }) => id === was.id && generation !== was.generation));
   if (changed.some(({ generation, low, high }) => generation === 0 || low === high)) start();
   else viewer.surround(allBounds());
-  // Before, the map was still being read.
+  // While the map is read for the first time, its new generations are not flushes.
   if (changed.some((was) => was.pending_tiles === 0 && was.generation > 0)) {
     $('live').hidden = false;
     $('live').title = `flush ${Math.max(...maps.map(({ generation }) => generation))}`;
@@ -394,7 +395,7 @@ function follow() {
   });
 }
 document.addEventListener('visibilitychange', () => {
-  // Only after the maps are shown.
+  // Do not connect before the maps are shown.
   if (viewer.layers.length > 0) follow();
 });
 

@@ -42,7 +42,8 @@ const cell = (x, y, z) => x + 1 + MOST * (y + 1 + MOST * (z + 1));
 const BESIDE = [1, -1, MOST, -MOST, MOST * MOST, -MOST * MOST];
 
 // Returns the faces that any threshold can make visible: position and direction (+x -x +y -y +z -z), the value of the
-// voxel, that of its neighbour plus one (0 without a neighbour), and the count. Only kind 0 has values to compare.
+// voxel, that of its neighbour plus one (0 without a neighbour), and the count. Only occupied voxels (kind 0) have
+// values to compare.
 export function facesOf(node) {
   const { count, x, y, z, value, counts, kind } = node;
   for (let i = 0; i < count; i++) grid[cell(x[i], y[i], z[i])] = kind === KIND.occupied ? value[i] + 1 : 256;

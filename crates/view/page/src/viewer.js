@@ -7,7 +7,7 @@ import { KIND } from './node.js';
 import { Overlays } from './overlays.js';
 
 const MOST_CALLS = 200;
-// Trajectory, sensor, marks, grid, bounding box.
+// Draw calls reserved for overlays: trajectory, sensor, marks, grid, bounding box.
 const OVERLAY_CALLS = 8;
 
 // Scene with layers, overlays and camera. Draws only after changes.
@@ -112,7 +112,7 @@ export class Viewer {
     this.mostCalls = Math.max(this.mostCalls, this.renderer.info.render.calls);
     const meshes = this.layers.reduce((sum, layer) => sum + layer.tiles.visibleTiles.size, 0);
     if (this.firstPictureMs === null && meshes > 0) this.firstPictureMs = performance.now();
-    // The frame shows all loaded nodes, and none are pending.
+    // The view is settled after two frames in which no node is pending and the camera does not move.
     const isReady = this.layers.every((layer) => layer.isReady);
     this.settled = isReady && this.wasReady && !moved;
     this.wasReady = isReady;

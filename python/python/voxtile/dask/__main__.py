@@ -14,7 +14,7 @@ import distributed
 from ..errors import ArgumentError, VoxtileError
 from .building import build
 
-# Its type hints are incomplete.
+# The type hints of `distributed` are incomplete.
 _dask: Any = distributed
 
 # Dask samples its own processes fifty times a second, which costs 7 % of a core. It also makes workers return memory to

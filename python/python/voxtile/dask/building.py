@@ -1,7 +1,7 @@
 """A build divided into columns of tiles.
 
 Each task maps the scans that reach its column, and only into that column's tiles. Tasks therefore have no order and
-share no state, and a lost task can run again. Columns are disjoint shards of one map, which takes over their files.
+share no state, and a lost task can run again. The results are disjoint shards, whose files become those of the map.
 """
 
 from __future__ import annotations
@@ -43,10 +43,10 @@ _Path = str | os.PathLike[str]
 # A scan's fingerprint, and the box that it may change.
 _ScanBox = tuple[str, Box | None]
 
-# Its type hints are incomplete.
+# The type hints of `distributed` are incomplete.
 _dask: Any = distributed
 
-# Options that would select other scans in each task.
+# Options that are not supported, with their defaults: each task would apply them to its own scans.
 _UNSUPPORTED = {"every": 1, "first": 0, "count": None}
 
 # Default range of ``voxtile build``.
@@ -126,7 +126,8 @@ def build(
             remove(parts)
             return {**adopted, "output": str(output), "regions_done_before": adopted["regions"]}
         map_id = _id_of(parts) if base is None else base.map_id
-        # A task of an abandoned call may still write its part here, for a map of another id.
+        # The names of parts depend on the id of the map, because a task of an abandoned call may still write a part
+        # here.
         mark = _fingerprint(drive, map_id, None if base is None else base.flush_number)
         wanted = {parts / f"{mark}-{x}-{y}": ((x, y), ranges) for (x, y), ranges in columns.items()}
         open_parts = {part: what for part, what in wanted.items() if not part.exists()}
@@ -192,7 +193,7 @@ class _Base:
     map_id: str
     flush_number: int
     scan_number: int
-    # Number of scans missing from its list of scans: those of updates. ``None`` if unknown.
+    # Number of scans that the map's list of scans lacks, because updates do not list them. ``None`` if unknown.
     unlisted_scans: int | None
     tile_size: float
 
@@ -254,7 +255,8 @@ def _committed_before(parts: Path, drive: str, base: _Base) -> dict[str, Any] | 
     if noted["drive"] != drive or before.map_id != base.map_id or before.flush_number == base.flush_number:
         return None
     report: dict[str, Any] = noted["report"]
-    # The flush number alone does not identify the update: another writer may have flushed scans, which are in the list.
+    # The flush number alone does not identify the update: another writer may have flushed scans. Those are in the list
+    # of scans, unlike scans of updates.
     added = _difference(base.unlisted_scans, before.unlisted_scans)
     if added == report["scans"]:
         return report
@@ -324,7 +326,8 @@ def _plan(client: Any, source: str, settings: dict[str, Any]) -> tuple[list[_Sca
     """
     reading = {name: value for name, value in settings.items() if name in ReadOptions.__annotations__}
     reach = (settings["max_range"], settings.get("clear_no_return"))
-    # Other formats without a stored number would have to be read completely to count their scans, so they get one task.
+    # Scan streams are cheap to count. Other formats that store no number of scans would have to be read completely, so
+    # they get one task.
     is_stream = source.lower().endswith(".scans")
     scans = files.count_scans(source, **reading) if is_stream else operator.length_hint(files.scans(source, **reading))
     workers = max(sum(client.nthreads().values()), 1)
@@ -374,7 +377,7 @@ def _map_column(
                 crop(of_map, made, tiles_of(column, *sizes), shard_of=map_id)
             for first, last in ranges:
                 options: dict[str, Any] = {**settings, "first": first, "count": last - first}
-                # Later ranges contain other scans of the same input.
+                # Ranges after the first append other scans of the same input.
                 resume: dict[str, Any] = {"append": True, "again": True} if os.path.exists(made) else {}
                 files.build_shard(source, made, map_id, region=region_of(column, sizes[0]), **options, **resume)
             move_to_place(made, part, map_id)

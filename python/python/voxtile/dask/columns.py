@@ -31,7 +31,7 @@ _Path = str | os.PathLike[str]
 _Index = tuple[int, int, int]
 _Progress = Callable[[int, int], object] | None
 
-# Its type hints are incomplete.
+# The type hints of `distributed` are incomplete.
 _dask: Any = distributed
 
 # Default edge of a column in tiles.
@@ -66,8 +66,8 @@ def merge(
 ) -> dict[str, Any]:
     """Merges maps of several sessions as ``voxtile.merge`` does, by the same rules.
 
-    Without ``prefer``, evidence that the maps have in common counts twice; unlike ``voxtile.merge``, nothing warns
-    of this.
+    Without ``prefer``, evidence that the maps have in common counts twice. Unlike ``voxtile.merge``, this function
+    does not warn of it.
     """
     if not maps:
         raise ArgumentError("maps: the list is empty; pass one or more")
@@ -95,7 +95,7 @@ def verify(
     for part in parts:
         for name in ("tiles", "voxels", "table_bytes"):
             rest[name] += part[name]
-        # Every task reports problems of the lists of the map.
+        # Every task also finds problems of the map's lists, so keep only one of equal findings.
         rest["findings"] += [finding for finding in part["findings"] if finding not in rest["findings"]]
     damage = sum(finding["severity"] == "damage" for finding in rest["findings"])
     return {**rest, "damage": damage, "notes": len(rest["findings"]) - damage}
@@ -166,7 +166,7 @@ def _make(
     columns, size = _divided(tiles, tile_size, region_size)
     # A map without tiles still has parameters.
     columns = columns or {(0, 0): []}
-    # Not the name for parts of a build, which are kept after a failure.
+    # A build uses another folder name, because it keeps its parts after a failure.
     with attempt_in(output.with_name(output.name + ".columns")) as shards:
         map_id = shards.name
         tasks = [

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 _Path = str | os.PathLike[str]
 
-# Its type hints are incomplete.
+# The type hints of `distributed` are incomplete.
 _dask: Any = distributed
 
 

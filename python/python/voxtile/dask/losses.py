@@ -11,13 +11,15 @@ import distributed
 
 from ..errors import VoxtileError
 
-# Its type hints are incomplete.
+# The type hints of `distributed` are incomplete.
 _dask: Any = distributed
 
 
 @contextmanager
 def explained(*, use_less: str, then: str) -> Iterator[None]:
-    """Turns such a loss into an error with a remedy: how a task uses less memory, and what to do next."""
+    """Replaces the exception of a lost worker or scheduler by an error with a remedy. ``use_less`` describes how a task
+    uses less memory, ``then`` what to do next.
+    """
     try:
         yield
     except _dask.KilledWorker as error:

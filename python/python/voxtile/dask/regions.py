@@ -15,7 +15,8 @@ Column = tuple[int, int]
 # The first scan, and the one after the last.
 Range = tuple[int, int]
 
-# Scans in a gap are read but change nothing. Reopening the map after a gap takes as long as reading this many.
+# Two visits of a column are read as one range if there are at most this many scans between them. These scans change
+# nothing there, but reading them takes no longer than reopening the map for a second range.
 JOINED_GAP_SCANS = 20
 
 
@@ -28,7 +29,7 @@ def columns_of(
 ) -> dict[Column, list[Range]]:
     """Returns the columns that scans may reach, each with its ranges of scans in order.
 
-    If a drive returns to a column, the scans in between are skipped, unless they are at most ``joined_gap``. Raises
+    If a drive returns to a column, the scans in between are skipped if they are more than ``joined_gap``. Raises
     an error for more than ``most`` columns.
     """
     columns: dict[Column, list[Range]] = {}
@@ -88,7 +89,7 @@ def _first_tile(column: int, size: float, tile_size: float) -> int:
 
 
 def _column_along_axis(tile: int, size: float, tile_size: float) -> int:
-    # This division rounds differently: a center on a border may be assigned to the next column.
+    # The division rounds differently from `_first_tile`, so a center on a border may get the next column.
     column = math.floor((tile + 0.5) * tile_size / size)
     while tile < _first_tile(column, size, tile_size):
         column -= 1

@@ -1,4 +1,4 @@
-"""Hand-over of the shards that tasks make, under the id of the final map."""
+"""Moves the shards that tasks make to the folder of the final map, with the id of that map."""
 
 from __future__ import annotations
 
@@ -75,7 +75,8 @@ def locked(parts: Path, own: re.Pattern[str]) -> Iterator[None]:
 def attempt_in(folder: Path) -> Iterator[Path]:
     """Makes a new folder in ``folder`` and removes it at the end, with the remains of killed calls.
 
-    Its name is 32 hexadecimal digits. Tasks of an abandoned call may still write to another one.
+    Each call has a folder of its own (32 hexadecimal digits), because tasks of an abandoned call may still write to
+    theirs.
     """
     with locked(folder, _ATTEMPT):
         attempt = folder / uuid.uuid4().hex

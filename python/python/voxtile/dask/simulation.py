@@ -54,8 +54,10 @@ _MAX_TILES = 1000
 
 
 def cpu_factor(region_size: float, reach: float, costs: Costs = Costs()) -> float:
-    """CPU time of a distributed build on a straight drive over that of one build, without the final join."""
-    # A region also reads the scans within their range of its border, at both ends of a street.
+    """Returns the CPU time of a distributed build of a straight drive, without the final join, as a multiple of that of
+    a single build.
+    """
+    # A region also reads the scans outside it that reach it, at both ends of the street.
     read_times = (region_size + 2 * reach) / region_size
     scans_of_region = max(region_size, 1.0)
     one = costs.read_scan_s + costs.map_scan_s
@@ -66,8 +68,8 @@ def cpu_factor(region_size: float, reach: float, costs: Costs = Costs()) -> floa
 def advised_region_size(max_range: float | None, tile_size: float, costs: Costs = Costs()) -> float:
     """Returns the edge of the smallest region, in metres, that keeps CPU time within 1.3 of one build.
 
-    Small regions balance the load. If no size reaches the goal, returns the first whose double would gain less than
-    0.01.
+    Small regions balance the load. If no size reaches the goal, returns the first size for which twice the size
+    would reduce the multiple by less than 0.01.
     """
     reach = _USUAL_RANGE_M if max_range is None else max_range
     for tiles in range(2 * _TILES_STEP, _MAX_TILES + 1, _TILES_STEP):

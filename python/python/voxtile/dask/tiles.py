@@ -24,7 +24,7 @@ _Path = str | os.PathLike[str]
 _Index = tuple[int, int, int]
 _T = TypeVar("_T")
 
-# Its type hints are incomplete.
+# The type hints of `dask.bag` are incomplete.
 _bag: Any = dask.bag
 
 # Tiles per task: opening a map takes as long as reading a few.

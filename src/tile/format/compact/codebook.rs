@@ -6,7 +6,8 @@ use crate::tile::table::{Palette, StateId};
 use rustc_hash::FxHashMap;
 use std::cmp::Reverse;
 
-/// Numbered states that occur in more than one voxel of a table, and their symbols.
+/// Codebook of a table: the states (log-odds and observation count) that occur in more than one voxel, with numbers and
+/// symbols.
 pub(super) struct Codebook {
     pub(super) states: Vec<Evidence>,
     pub(super) symbols: Symbols,
@@ -16,7 +17,7 @@ pub(super) struct Codebook {
     others: FxHashMap<StateKey, u16>,
 }
 
-/// State of the codebook.
+/// State that occurs in more than one voxel.
 struct Common {
     voxels: u32,
     state: StateKey,
@@ -39,7 +40,8 @@ impl Codebook {
         commons.sort_unstable_by_key(|common| (Reverse(common.voxels), common.rank()));
         commons.truncate(MAX_STATES);
         let symbols = Symbols::of(commons.len());
-        // Any order within the one-byte symbols and within the two-byte symbols takes the same space.
+        // Sort similar states together, which compresses better. A new order within the one-byte symbols, and within
+        // the two-byte symbols, does not change the length of the symbols.
         let (one_byte, two_bytes) = commons.split_at_mut(symbols.direct().into());
         one_byte.sort_unstable_by_key(|common| common.rank());
         two_bytes.sort_unstable_by_key(|common| common.rank());

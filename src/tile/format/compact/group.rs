@@ -12,7 +12,7 @@ use std::io;
 /// Number of voxels that completes a group: reading one voxel decodes its whole group.
 const GROUP_VOXELS: usize = 1 << 15;
 
-/// Maximum that a reader accepts; version 1 wrote such groups.
+/// Maximum number of voxels of a group that a reader accepts; version 1 wrote such groups.
 pub(super) const MAX_GROUP_VOXELS: usize = (1 << 16) + BRICK_VOXELS - 1;
 
 /// Maximum number of bricks in a group.
@@ -24,7 +24,7 @@ pub(super) struct Group {
     bricks: usize,
     /// For each brick but the first, the difference of its code from the previous one.
     steps: Vec<u8>,
-    /// For each brick, the set of nonzero words in its mask.
+    /// For each brick, the set of nonzero words in its mask: bit `k` for word `k`.
     words: Vec<u8>,
     /// The nonzero words.
     masks: Vec<u8>,
@@ -140,7 +140,7 @@ impl Group {
         column_writer.put_columns(columns.map(|column| &column[..]), out)?;
         self.clear();
         let group = &out[begin..];
-        // At most 2^15 + 511 voxels of 14 bytes, and bricks.
+        // The length fits into 32 bits: at most 2^15 + 511 voxels of 14 bytes, and their bricks.
         Ok(Some(GroupEntry { first, bytes: group.len() as u32, crc: crc32fast::hash(group) }))
     }
 

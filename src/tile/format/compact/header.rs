@@ -16,7 +16,7 @@ pub(super) struct Header {
     pub(super) voxels: usize,
     pub(super) bricks: usize,
     pub(super) states: usize,
-    /// This and the following fields are 0 in version 1.
+    /// Number of groups. This field and the following ones are 0 in version 1.
     pub(super) groups: usize,
     pub(super) codebook_bytes: usize,
     pub(super) codebook_crc: u32,
@@ -24,7 +24,7 @@ pub(super) struct Header {
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Version {
-    /// Groups without an index, each beginning with the step from the previous one.
+    /// Groups without an index. The first brick of a group is encoded as the difference from the last brick before it.
     One,
     Two,
 }
@@ -87,7 +87,7 @@ impl Header {
     }
 
     pub(super) fn to_bytes(&self) -> [u8; HEADER_BYTES] {
-        // A tile has at most 2^21.1 bricks.
+        // The counts fit into 32 bits: a tile has at most 2^21.1 bricks.
         let [bricks, states, groups, codebook_bytes] =
             [self.bricks, self.states, self.groups, self.codebook_bytes].map(|count| count as u32);
         let mut header = [0; HEADER_BYTES];

@@ -144,7 +144,7 @@ impl OpenBrick {
     }
 }
 
-/// Sets the states of a mask whose symbols are codebook numbers.
+/// Sets the states of the voxels in `mask`, whose symbols are codebook numbers.
 #[inline]
 fn set(cell: &mut [StateId; CELL_VOXELS], mask: u64, symbols: &[u8]) {
     if let Ok(symbols) = <&[u8; CELL_VOXELS]>::try_from(symbols) {

@@ -20,8 +20,8 @@ pub(super) struct StateKey {
     pub(super) observation_count: i32,
 }
 
-/// Maximum number of states that are counted, the first in Morton order: as many as a palette can contain. Only a table
-/// with plain bricks can have more.
+/// Maximum number of states that are counted: as many as a palette can contain. A table has more only if some of its
+/// bricks do not use the palette; then the first states in Morton order are counted.
 const MAX_COUNTED: usize = (1 << 16) - 1;
 
 impl From<Evidence> for StateKey {
@@ -82,7 +82,8 @@ impl StateCounts {
     }
 }
 
-/// Adjacent voxels often have the same state; several lanes avoid waiting for a count just written.
+/// Number of counters per state. Adjacent voxels often have the same state, and with alternating counters no increment
+/// waits for the one before.
 const LANES: usize = 4;
 
 fn count_all(brick: &Brick, counts: &mut [[u32; LANES]]) {

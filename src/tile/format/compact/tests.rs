@@ -17,7 +17,8 @@ fn state(log_odds: f64, observation_count: i32) -> Evidence {
     Evidence { log_odds, observation_count }
 }
 
-/// Small and large tiles, on and off the borders of bricks, at the wrap-around of keys and at the limits of `i32`.
+/// Returns a small or large tile, on or off the borders of bricks, at the wrap-around of keys or at the limits of
+/// `i32`.
 fn any_tile(random: &mut Random) -> VoxelBox {
     let n = [2, 3, 7, 8, 16, 21, 40][random.below(7) as usize];
     let min = std::array::from_fn(|_| match random.below(4) {
@@ -29,7 +30,7 @@ fn any_tile(random: &mut Random) -> VoxelBox {
     VoxelBox { min, end: min.map(|k| k + n) }
 }
 
-/// Few states, many, or one per voxel; occasionally a rare one.
+/// Returns a state by `kind`: one of 3, 250 or 3,000 states, or a new one for each voxel. Occasionally an extreme one.
 fn any_state(random: &mut Random, kind: u64) -> Evidence {
     const ODD: [f64; 8] =
         [0.0, -0.0, f64::MIN_POSITIVE / 3.0, -5e-324, f64::MAX, f64::MIN, 1.0 + f64::EPSILON, -2.0];
@@ -105,7 +106,7 @@ fn read(bytes: &[u8], tile: &VoxelBox) -> Result<Table, FormatError> {
     table
 }
 
-/// Checks that some voxels, observed and not, are the same when each is read from its group alone.
+/// Checks that some voxels, observed and unobserved ones, are the same when each is read from its group alone.
 fn assert_is_found_alone(bytes: &[u8], tile: &VoxelBox, table: &Table) {
     let index = CompactIndex::read(&mut &bytes[..], bytes.len() as u64, tile).unwrap().unwrap();
     let middle = (table.len() / 2).saturating_sub(1);

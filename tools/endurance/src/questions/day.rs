@@ -16,23 +16,23 @@ use workload::SurveyName;
 const RAYS: u32 = 1_000;
 const RAYS_SHORT: u32 = 4_000;
 /// Scans a second of the survey. The day uses every n-th of them (`EVERY`), so that it takes half an hour instead of
-/// two.
+/// two hours.
 const SURVEYED_PER_S: usize = 10;
 const EVERY: usize = 4;
 const EVERY_SHORT: usize = 96;
 const HOURS: usize = 12;
 const FLUSH_EVERY_S: usize = 10;
 const FLUSH_EVERY_SCANS_SHORT: usize = 100;
-/// Scans of a round, at 1 m/s.
+/// Number of scans of the survey in one round of 2.4 km at 1 m/s.
 const SCANS_PER_ROUND: usize = 24_000;
 /// Maximum ratio of the last part to the middle one. By the middle, everything has been seen often.
 const MAX_GROWTH: f64 = 1.05;
-/// The same for bytes on disk. Counts of observations still increase, and with them, ever more slowly, the number of
-/// different states in a tile.
+/// Maximum ratio for bytes on disk. It is larger, because observation counts still increase, so that voxels of a tile
+/// have more different values.
 const MAX_DISK_GROWTH: f64 = 1.25;
-/// The same for a short day, whose voxels have not been seen often enough to be stable.
+/// Maximum ratio for a short day, in which voxels are not seen often enough to be stable.
 const MAX_GROWTH_SHORT: f64 = 1.5;
-/// The same for times.
+/// Maximum ratio for CPU times.
 const MAX_SLOWER: f64 = 1.15;
 
 pub fn answer(setting: &Setting) -> Result<Findings> {

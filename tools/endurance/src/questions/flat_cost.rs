@@ -13,7 +13,7 @@ use workload::SurveyName;
 
 /// Number of scans generated before they are inserted one after another.
 const SCANS_AT_A_TIME: usize = 50;
-/// Maximum ratio of the cost in the last stretch to that in the second.
+/// Maximum ratio of the cost of a scan in the last stretch of the trajectory to that in the second stretch.
 const MAX_GROWTH: f64 = 1.15;
 /// Maximum ratio of the 99th percentile to the median.
 const MAX_SLOW: f64 = 3.0;
@@ -93,7 +93,7 @@ fn last_stretch(built: &Built, stretch_m: f64) -> &[ScanCost] {
 
 /// The scans during which tiles are evicted: those after the first write.
 fn evicting(built: &Built) -> &[ScanCost] {
-    // A new map has written its metadata and log.
+    // Before the first eviction, only the metadata and the log of the new map are written.
     let begin = built.scans.first().map_or(0, |scan| scan.bytes_written);
     &built.scans[built.scans.partition_point(|scan| scan.bytes_written <= begin)..]
 }

@@ -16,7 +16,7 @@ use workload::SurveyName;
 const SLOW_BYTES_PER_S: f64 = 40e6;
 /// Minimum ratio of the map's bytes with octomap storage to those with compact storage.
 const MIN_SMALLER: f64 = 8.0;
-/// The limit that is measured in addition to no limit, in MiB: a fraction of each map.
+/// Memory limit of the second measurement of each map, in MiB: a fraction of the map. The first has no limit.
 const LIMIT_MIB: usize = 64;
 const SHORT_LIMIT_MIB: usize = 24;
 /// Maximum ratio of the wall time with compact storage to that with octomap storage. It allows for the noise of

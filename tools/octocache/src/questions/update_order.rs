@@ -122,7 +122,7 @@ fn measure(setting: &Setting, dataset: &Dataset, is_distinct: bool) -> Result<Ve
     Ok(contenders)
 }
 
-/// The same updates in all orders. If every update counts, its value is that of the voxel at that time.
+/// Returns the same updates in all orders. If every update counts, its value is the log-odds of the voxel after it.
 fn contenders(model: &SensorModel, stream: &[Update], is_distinct: bool) -> Vec<Contender> {
     let distinct = if is_distinct { last_values(&accumulated(model, stream)) } else { Vec::new() };
     let mut contenders = Vec::new();

@@ -39,14 +39,14 @@ struct Measured {
     times: [Times; 4],
 }
 
-/// OctoMap's `insertPointCloudRays`: the paper's OctoMap.
+/// Measures builds in which every ray counts, as in OctoMap's `insertPointCloudRays`. The paper calls this OctoMap.
 pub fn every_ray(setting: &Setting) -> Result<Answer> {
     let files = ["every_ray_wall", "every_ray_cpu", "every_ray_seconds", "every_ray"];
     let caption = "Time to build a map where every ray counts, by resolution";
     answer(setting, &Workflow { insert_mode: InsertMode::PerRay, scans: 1, files, caption })
 }
 
-/// Duplicates are removed before the octree is updated: the paper's OctoMap-RT.
+/// Measures builds in which duplicates are removed before the octree is updated. The paper calls this OctoMap-RT.
 pub fn once_a_scan(setting: &Setting) -> Result<Answer> {
     let files = ["once_a_scan_wall", "once_a_scan_cpu", "once_a_scan_seconds", "once_a_scan"];
     let caption = "Time to build a map where a voxel counts once a scan, by resolution";

@@ -50,7 +50,7 @@ impl FaultyDisk {
         Self { state: Arc::new(Mutex::new(state)) }
     }
 
-    /// Returns the disk as a mapper needs it.
+    /// Returns a handle to the same disk, in the form that a mapper takes.
     pub fn shared(&self) -> Arc<dyn Disk> {
         Arc::new(self.clone())
     }
@@ -91,7 +91,7 @@ impl FaultyDisk {
         self
     }
 
-    /// Ends a lack of space, or replaces a failing disk by a good one with the same bytes.
+    /// Ends all faults except unreadable bytes, like free space on a full disk or a new disk with the same content.
     pub fn make_room(&self) {
         let mut state = self.state();
         (state.has_space, state.fault) = (true, Fault::None);
@@ -177,8 +177,8 @@ impl FaultyDisk {
         left
     }
 
-    /// The disk as another process sees it after a kill of this one: nothing is lost, and nothing more is on the
-    /// medium.
+    /// Returns the disk as another process sees it after a kill of this one: no data is lost, and unsynced data remains
+    /// unsynced.
     pub fn after_kill(&self) -> Self {
         let state = self.state();
         let mut disk = Self::of(state.names.clone(), state.contents.clone(), Fault::None);
@@ -194,7 +194,7 @@ impl FaultyDisk {
         disk
     }
 
-    /// A copy, with everything on the medium that programs see.
+    /// Returns a copy of the disk on which all data has reached the medium.
     pub fn copy(&self) -> Self {
         self.after_crash(Unsynced::Kept)
     }

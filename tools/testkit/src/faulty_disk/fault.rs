@@ -14,7 +14,7 @@ pub enum Fault {
     /// The change fails. If it is a sync, the file on the medium keeps its old content, and later syncs of the same
     /// bytes report success, as on Linux.
     LosesSync(u64),
-    /// The same, and the process is killed at once: every later operation fails.
+    /// Same as `LosesSync`, and the process is killed at once: every later operation fails.
     LosesSyncAndDies(u64),
     /// From this change on, the disk has no space for new data, until [`super::FaultyDisk::make_room`].
     IsFull(u64),

@@ -19,13 +19,14 @@ pub(super) type Names = BTreeMap<PathBuf, Entry>;
 pub(super) enum NameChange {
     Put(PathBuf, Entry),
     Remove(PathBuf),
-    /// Also removes the files that were in the folder, on the medium or unsynced: another folder may get its name.
+    /// Removes a folder and the files that were in it. The files are listed, because another folder may get the same
+    /// name before this change reaches the medium.
     RemoveFolder(PathBuf, Vec<Inode>),
     Rename(PathBuf, PathBuf),
 }
 
 impl NameChange {
-    /// Adjusts the names to a rename of a folder around them.
+    /// Adjusts the names to a rename of a folder that contains them.
     pub(super) fn follow(&mut self, from: &Path, to: &Path) {
         let follow = |name: &mut PathBuf| {
             if let Ok(rest) = name.strip_prefix(from)

@@ -14,7 +14,7 @@ const MAX_ACCELERATION_M_S2: f64 = 7.5;
 /// Planning horizon of the paper.
 const HORIZON_M: f64 = 25.0;
 const RADIUS_M: f64 = 0.2;
-/// Longer than the braking distance.
+/// Distance ahead within which obstacles limit the speed; longer than the braking distance.
 const BRAKING_LOOK_M: f64 = 12.0;
 /// Interval of scans, each of which is followed by a plan.
 const SCAN_EVERY_S: f64 = 0.1;

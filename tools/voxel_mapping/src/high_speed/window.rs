@@ -4,11 +4,10 @@ use voxtile::space::{Grid, Point, VoxelIndex};
 use voxtile::{Result, Scan};
 use voxtile_local::{LocalMap, LocalParameters, LocalView};
 
-/// A fixed window around the robot, as in array-based planners: it contains nothing outside, and forgets what leaves
-/// it.
+/// A window of fixed size around the robot, as in array-based planners. Voxels outside the window are dropped.
 ///
-/// For each scan, a local map is rebuilt from the voxels of the window. Its time is not that of an array, and is not
-/// measured.
+/// For each scan, a local map is rebuilt from the voxels of the window. This takes another time than an array would, so
+/// it is not measured.
 pub struct Window {
     grid: Grid,
     occupied: HashSet<VoxelIndex>,

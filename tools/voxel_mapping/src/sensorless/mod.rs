@@ -18,7 +18,7 @@ use std::time::Duration;
 const RESOLUTION_M: f64 = 0.1;
 /// Interval of plans, and of the scans of a spotter (5 Hz).
 const STEP: Duration = Duration::from_millis(200);
-/// A flight that takes longer has not arrived.
+/// Maximum number of steps of a flight. A longer flight counts as not arrived.
 const MAX_STEPS: u32 = 600;
 /// Number of steps of the spotters before the travellers start.
 const HEAD_START_STEPS: u32 = 25;

@@ -7,7 +7,8 @@ const SCALE: f64 = 9.0;
 const MARGIN_M: f64 = 4.0;
 const COLORS: [&str; 4] = ["#b2182b", "#d6604d", "#2166ac", "#4393c3"];
 
-/// Draws the forest from above twice: with the shared voxels and their flights, and with the flights with own sensors.
+/// Draws the forest from above twice: once with the shared voxels and the flights that use them, once with the flights
+/// that use own sensors.
 pub fn page(forest: &Forest, sharing: &Sharing, flights: [&[Traveller]; 2]) -> String {
     let (width, height) = ((LENGTH_M + 2.0 * MARGIN_M) * SCALE, (WIDTH_M + 2.0 * MARGIN_M) * SCALE);
     let mut page = format!(

@@ -14,7 +14,7 @@ pub struct LivoxCustom<'a> {
     points: WireReader<'a>,
 }
 
-/// A time base further from the stamp belongs to another clock.
+/// Maximum time between time base and stamp. A larger difference shows that they are from different clocks.
 const MAX_BASE_NS: u128 = 1_000_000_000;
 
 /// `offset_time`, x, y, z, `reflectivity`, `tag`, `line`.

@@ -76,7 +76,7 @@ mod tests {
         let pixels: Vec<u16> = std::iter::from_fn(|| rvl.pixel()).take(7).collect();
         assert_eq!(pixels, [0, 0, 10, 9, 9, 0, 0]);
         assert_eq!(Rvl::new(&[]).pixel(), None);
-        assert_eq!(Rvl::new(&words(&[8; 16])).pixel(), None, "numbers end");
-        assert_eq!(Rvl::new(&words(&[0; 16])).pixel(), None, "empty runs end");
+        assert_eq!(Rvl::new(&words(&[8; 16])).pixel(), None, "a number of more than 11 groups is invalid");
+        assert_eq!(Rvl::new(&words(&[0; 16])).pixel(), None, "empty runs contain no pixels");
     }
 }

@@ -170,7 +170,7 @@ fn static_transforms_are_used_before_and_long_after_motion() {
     let mut tf = Transforms::default();
     fixed(&mut tf, "map", "odom", at(0.1));
     moving(&mut tf, "map", "odom", &[S], 0.5);
-    assert_eq!(tf.lookup("map", "odom", S), Ok(at(0.1)), "one alone is doubtful");
+    assert_eq!(tf.lookup("map", "odom", S), Ok(at(0.1)), "a single sample is not trusted");
     moving(&mut tf, "map", "odom", &[2 * S], 0.5);
     assert_eq!(tf.lookup("map", "odom", S / 2), Ok(at(0.1)));
     assert_eq!(tf.lookup("map", "odom", S + 1), Ok(at(0.5)));
@@ -223,7 +223,7 @@ fn root_follows_repeated_transforms() {
     moving(&mut tf, "map", "world", &[2], 0.3);
     assert_eq!((tf.root_of("lidar"), tf.ancestors("lidar").len()), ("world".to_owned(), 3));
     fixed(&mut tf, "lidar", "world", at(0.3));
-    assert_eq!(tf.root_of("lidar"), "world", "a loop ends where it closes");
+    assert_eq!(tf.root_of("lidar"), "world", "a loop does not change the root");
 }
 
 #[test]
@@ -264,7 +264,7 @@ fn topic_samples_act_as_a_parent() {
     assert_eq!(tf.attach("/", "base", samples()), Err(BadTransform::NoName));
     assert_eq!(tf.attach("empty", "base", Samples::default()), Ok(false));
     assert_eq!((tf.attach("/lidar", "/map", samples()), tf.parents_of("map")), (Ok(true), 1));
-    assert_eq!(tf.lookup("map", "lidar", MIDDLE), Ok(wanted), "a loop");
+    assert_eq!(tf.lookup("map", "lidar", MIDDLE), Ok(wanted), "a loop changes no pose");
     assert_eq!(tf.second_parent("lidar", "map").unwrap().loop_frames, ["lidar", "base", "odom", "map"]);
     for parent in 0..100 {
         assert_eq!(tf.attach(&format!("p{parent}"), "base", samples()), Ok(true));

@@ -5,7 +5,7 @@ pub fn type_hash(kind: TypeName) -> Option<&'static str> {
     HASHES.iter().find(|(known, _)| *known == kind).map(|(_, hash)| *hash)
 }
 
-/// Checked by `tests/type_hashes.py`, which computes the hashes from the definitions.
+/// Hashes of all types that the node uses. `tests/type_hashes.py` computes them from the definitions and compares.
 const HASHES: [(TypeName, &str); 16] = [
     (
         TypeName::new("sensor_msgs", "PointCloud2"),

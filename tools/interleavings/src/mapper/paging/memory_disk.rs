@@ -15,7 +15,7 @@ struct State {
     names: BTreeMap<PathBuf, Entry>,
     refuses: bool,
     refused: u64,
-    /// Number of times each new file of a tile was begun.
+    /// Number of times each file of a tile was created.
     begun: BTreeMap<PathBuf, u64>,
 }
 
@@ -45,7 +45,7 @@ impl MemoryDisk {
         self.lock().refused
     }
 
-    /// Number of times a file was begun.
+    /// Returns the number of times a file was created.
     pub(super) fn begun(&self, path: &Path) -> u64 {
         self.lock().begun.get(path).copied().unwrap_or_default()
     }

@@ -234,14 +234,14 @@ fn tiles_keep_their_contents_while_saved_and_loaded() {
     in_many_orders(|| run_scenario(Storage::Compact, false));
 }
 
-/// The same if the saving thread unpacks tiles.
+/// With octomap storage, the saving thread must also unpack the tiles.
 #[test]
 fn tiles_unpacked_by_the_saving_thread_keep_their_contents() {
     in_many_orders(|| run_scenario(Storage::OctoMap, false));
 }
 
-/// The same with background flushes during inserts, queries and the drop of the map: the map on disk is that of one of
-/// the flushes.
+/// Background flushes run during inserts, queries and the drop of the map. The map on disk is that of one of the
+/// flushes.
 #[test]
 fn a_background_flush_saves_the_map_as_of_one_scan() {
     in_many_orders(|| run_scenario(Storage::Compact, true));

@@ -2,7 +2,8 @@ use super::contents::TileContents;
 use shuttle::sync::{Mutex, MutexGuard};
 use std::ops::{Deref, DerefMut};
 
-/// The contents behind a lock of the scheduler, whose guards cannot be released temporarily.
+/// Replaces the mapper's type of this name. The scheduler's guards cannot be released temporarily, so `unlocked` drops
+/// the guard and locks again.
 #[derive(Debug)]
 pub(in crate::mapper) struct SharedContents(Mutex<TileContents>);
 

@@ -2,7 +2,8 @@ use super::tile_disk::TileDisk;
 use shuttle::sync::{Mutex, MutexGuard};
 use std::ops::{Deref, DerefMut};
 
-/// The disk behind a lock of the scheduler, whose guards cannot be released temporarily.
+/// Replaces the mapper's type of this name. The scheduler's guards cannot be released temporarily, so the guard is
+/// dropped and taken again.
 #[derive(Debug)]
 pub(super) struct SharedDisk(Mutex<TileDisk>);
 
