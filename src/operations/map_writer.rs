@@ -196,8 +196,8 @@ impl MapWriter {
     ///
     /// # Errors
     ///
-    /// An I/O error. There is no map then. The exception is a failure of the last step, the sync of the folder that
-    /// contains the map.
+    /// An I/O error. Then there is no map, unless only the last step failed: the sync of the folder that contains the
+    /// map.
     pub fn finish(mut self) -> Result<WrittenMap> {
         self.commit()?;
         // Finish the commit now, so that the map has no remaining work when it becomes visible.

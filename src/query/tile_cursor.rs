@@ -35,7 +35,7 @@ impl<'a, V: MapView + ?Sized> TileCursor<'a, V> {
         Self { view, tile: None, one_by_one: FEW_ABSENT }
     }
 
-    /// The tile that contains a voxel; `None` if it has no observations.
+    /// The tile that contains a voxel; `None` if the tile has no observations.
     pub(super) fn tile_of(&mut self, voxel: VoxelIndex) -> Result<Option<&Tile>> {
         Ok(self.current(voxel)?.tile.as_deref())
     }

@@ -59,7 +59,7 @@ pub enum Found<T> {
 
 /// Interval of checks for a new flush.
 const POLL_INTERVAL: Duration = Duration::from_millis(500);
-/// Number of tiles in the first coarse levels of a large map, shown while the rest is read.
+/// Number of tiles of a large map that are read before the first coarse view is shown.
 const FIRST_TILES: usize = 512;
 /// Factor by which the number of tiles grows from one incomplete state to the next.
 const GROWTH: usize = 4;

@@ -144,9 +144,9 @@ def build(
 ) -> dict[str, Any]:
     """Makes a map of a file or folder of scans, or adds them to one, as ``voxtile build`` does.
 
-    ``BuildOptions`` lists the keywords. ``progress`` is called with the scans done and their number, 0 if that is not
-    known. Returns what the command prints with ``--json``; its remarks are warnings, too. If it is interrupted, the map
-    contains the scans accepted until then, and ``resume=True`` continues the build.
+    ``BuildOptions`` lists the keywords. ``progress`` is called with two numbers: the scans done and all scans, 0 if
+    their number is unknown. Returns what the command prints with ``--json``; its remarks are warnings, too. If it is
+    interrupted, the map contains the scans accepted until then, and ``resume=True`` continues the build.
     """
     answer = call_build(path, output, options, progress)
     for remark in answer["remarks"]:

@@ -63,8 +63,8 @@ impl TileContents {
         self.buffer.contains(index) || self.cache.is_dirty(index)
     }
 
-    /// Returns whether a tile can be made resident. Its spill file must not contain staged updates (those of a scan not
-    /// yet accepted), because they follow the buffered ones.
+    /// Returns whether a tile can be made resident. It cannot while its spill file contains staged updates: those of a
+    /// scan that is not accepted yet.
     pub(super) fn can_be_loaded(&self, index: TileIndex) -> bool {
         !self.cache.is_resident(index) && !self.buffer.is_staged(index)
     }

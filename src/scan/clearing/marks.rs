@@ -1,13 +1,8 @@
+use super::around::{Step, moved};
 use super::guard::BrickCells;
 use crate::scan::pages::MarkedBrick;
 use crate::space::{BrickMask, VoxelIndex};
 use rustc_hash::FxHashMap;
-
-/// Step to a brick from another one: -1, 0 or 1 along each axis.
-pub(crate) type Step = [i32; 3];
-
-/// Step of a brick to itself.
-pub(crate) const HERE: Step = [0; 3];
 
 /// Marks of a whole scan by brick. The index of a brick is that of its voxels divided by 8.
 pub(crate) trait Marks {
@@ -80,10 +75,4 @@ impl MarksAround for BrickMarksAround<'_> {
     fn may_have_hits(&self) -> bool {
         true
     }
-}
-
-/// Returns the index of the brick at a step from another one.
-#[inline]
-pub(crate) fn moved(brick: VoxelIndex, step: Step) -> VoxelIndex {
-    std::array::from_fn(|axis| brick[axis] + step[axis])
 }

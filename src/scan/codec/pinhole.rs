@@ -99,9 +99,9 @@ impl Pinhole {
         (pixel.abs() < 1e6 && is_it(pixel as i64)).then_some(pixel as i64)
     }
 
-    /// Converts coordinates to words: differences between each pixel and the one predicted from those before it. For a
-    /// point without a depth, the coordinate must have the same bits as the depth. Returns `false` if a coordinate has
-    /// no pixel.
+    /// Appends a word for each coordinate: the difference between its pixel and the one predicted from earlier pixels. A
+    /// coordinate of a point without a depth must have the bits of the depth. Returns `false` if a coordinate cannot be
+    /// encoded as a pixel.
     pub(super) fn words(&self, values: &[f64], depths: &[f64], words: &mut Vec<u64>) -> bool {
         let mut row = Expected::default();
         for (value, z) in values.iter().zip(depths) {

@@ -28,7 +28,7 @@ pub(crate) fn bricks_by_tile(
 /// Returns the number of parts into which tiles divide a brick, averaged over the bricks of a map and rounded: 1 for
 /// tiles that are much larger than bricks.
 ///
-/// Lists by tile take this multiple of the memory of the original bricks.
+/// Bricks split at tile borders take so many times the memory of the whole bricks.
 pub(crate) fn mean_tiles_of_brick(grid: &Grid) -> usize {
     let (tile, brick) = (grid.voxels_per_tile_edge() as usize, BRICK_EDGE as usize);
     // Within tiles, bricks begin at multiples of `step`, at each one equally often.

@@ -51,7 +51,7 @@ impl Table {
         }
     }
 
-    /// Applies runs of updates of bricks, in insertion per ray; stage by stage, as [`Table::update_bricks`].
+    /// Applies runs of updates of bricks, in insertion per ray. Works in stages, as [`Table::update_bricks`] does.
     pub fn update_runs(&mut self, model: &SensorModel, runs: &TileRuns) {
         self.palette.use_model(model);
         let mut known = MissRuns::new();

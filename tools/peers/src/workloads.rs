@@ -34,7 +34,7 @@ pub struct Targets {
     pub one_thread: Option<Target>,
     /// Insertion, wall time of two threads.
     pub two_threads: Option<Target>,
-    /// The same, with the octrees updated after every scan.
+    /// Insertion, wall time of two threads, with the octrees updated after every scan.
     pub synced: Option<Target>,
     /// Scans to a flushed map on disk.
     pub flushed: Option<Target>,

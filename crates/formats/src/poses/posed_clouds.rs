@@ -69,7 +69,7 @@ pub(crate) enum CloudPoses {
 pub(crate) struct PosedClouds {
     source: Box<dyn CloudSource>,
     path: PathBuf,
-    /// Files from which the input fingerprint of older map versions is computed.
+    /// Files from which earlier versions of voxtile computed the fingerprint of an input.
     files: Vec<PathBuf>,
     poses: CloudPoses,
     options: CloudOptions,

@@ -139,7 +139,7 @@ impl<'a> CloudMessage<'a> {
         }
     }
 
-    /// Returns the corrections of inconsistent messages, each as the end of a sentence about clouds.
+    /// Returns how inconsistent messages were corrected. Each text continues a sentence that begins with "clouds".
     pub(super) fn repairs(&self) -> &[&'static str] {
         match self {
             Self::PointCloud2(cloud) => cloud.repairs(),
