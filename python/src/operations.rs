@@ -7,14 +7,12 @@ use crate::map::region_of;
 use crate::watched::{Progress, watched_with_progress};
 use pyo3::prelude::*;
 use serde::Serialize;
-use std::fs::File;
-use std::io::BufReader;
 use std::path::{Path, PathBuf};
 use voxtile::integrity::VerifyScope;
 use voxtile::mapper::{MapReader, MapView, OctreeMap};
 use voxtile::operations::{self, Decay, Part, Prefer};
-use voxtile::{Error, MapPath, MemoryLimit, Result, SnapshotName, Stop, TileIndex, integrity, octree};
-use voxtile_pipeline::check_is_no_file;
+use voxtile::{MapPath, MemoryLimit, Result, SnapshotName, Stop, TileIndex, integrity};
+use voxtile_pipeline::{check_is_no_file, octree_file};
 
 /// A map, or a tuple of a map and the name of a snapshot.
 #[derive(FromPyObject)]
@@ -288,9 +286,7 @@ pub fn import_octree<'py>(
 ) -> PyResult<Bound<'py, PyAny>> {
     let storage = storage_of(py, storage)?;
     reported(py, progress, |_, progress| {
-        let opened = File::open(&file).map_err(|error| Error::io(&file, "open", error))?;
-        let map =
-            OctreeMap::of(octree::read(BufReader::new(opened)).map_err(|error| error.in_input(&file))?)?;
+        let map = OctreeMap::of(octree_file::read(&file)?)?;
         operations::import(&map, &output, storage, |done, all| progress.report(done, all))
     })
 }

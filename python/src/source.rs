@@ -1,12 +1,11 @@
 //! Open maps that can be queried: one open for writing, one open for reading, a file of OctoMap.
 
 use parking_lot::{Mutex, MutexGuard, RwLock};
-use std::fs::File;
-use std::io::BufReader;
 use std::path::Path;
 use std::time::Duration;
 use voxtile::mapper::{LiveReader, MapReader, MapView, Mapper, OctreeMap, Stoppable};
-use voxtile::{Error, MapConfig, OutOfCoreTileMapper, Result, Stop, octree};
+use voxtile::{Error, MapConfig, OutOfCoreTileMapper, Result, Stop};
+use voxtile_pipeline::octree_file;
 
 /// View of a map whose queries end with an error at the next tile after its stop is set.
 pub type View<'a> = Stoppable<'a, dyn MapView + 'a>;
@@ -40,9 +39,7 @@ impl Source {
 
     /// Loads a file of OctoMap.
     pub fn octree(path: &Path) -> Result<Self> {
-        let file = File::open(path).map_err(|error| Error::io(path, "open", error))?;
-        let file = octree::read(BufReader::new(file)).map_err(|error| error.in_input(path))?;
-        OctreeMap::of(file).map(|map| Self::Octree(Box::new(map)))
+        OctreeMap::of(octree_file::read(path)?).map(|map| Self::Octree(Box::new(map)))
     }
 
     /// Returns the configuration of the map.

@@ -6,7 +6,7 @@ use crate::poses::Rules;
 use crate::poses::find_poses;
 use crate::read::files::Files;
 use crate::read::from_origin::FromOrigin;
-use crate::read::input_file::open_input;
+use crate::read::open_input;
 use crate::read::listing::Listing;
 use crate::read::name_stamps::NameStamps;
 use crate::read::one::OneCloud;

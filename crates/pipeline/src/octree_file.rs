@@ -1,11 +1,11 @@
 //! OctoMap files as maps: contents and voxels.
 
-use std::fs::File;
 use std::io::BufReader;
 use std::path::Path;
 use voxtile::octree::{self, Leaf, OctreeFile};
 use voxtile::space::{Grid, MortonCode};
 use voxtile::{Error, Result};
+use voxtile_formats::read::open_input;
 use voxtile_formats::write::VoxelRow;
 
 /// Limit for the voxels of a file when its pruned leaves are expanded: a file of twenty bytes can represent 2^48
@@ -18,8 +18,7 @@ pub const MAX_VOXELS: u64 = 1 << 28;
 ///
 /// The file cannot be read or is not an OctoMap file.
 pub fn read(path: &Path) -> Result<OctreeFile> {
-    let file = File::open(path).map_err(|error| Error::io(path, "open", error))?;
-    octree::read(BufReader::with_capacity(1 << 16, file)).map_err(|error| error.in_input(path))
+    octree::read(BufReader::with_capacity(1 << 16, open_input(path)?)).map_err(|error| error.in_input(path))
 }
 
 /// Returns the grid of a file's voxels. The tile size is arbitrary (two voxels), because the file has no tiles.

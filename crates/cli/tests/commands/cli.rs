@@ -451,6 +451,11 @@ fn octomap_files_are_described_and_exported_and_a_bomb_is_refused() {
     fs::write(&bomb, header).unwrap();
     let (code, stderr) = failure(&["info", text(&bomb)]);
     assert!(code == 1 && stderr.contains("bomb.bt: malformed: offset"), "{stderr}");
+
+    let pointer = folder.path().join("pointer.bt");
+    fs::write(&pointer, "version https://git-lfs.github.com/spec/v1\noid sha256:00\nsize 5\n").unwrap();
+    let (_, stderr) = failure(&["info", text(&pointer)]);
+    assert!(stderr.contains("pointer.bt: is a Git LFS pointer, not the file itself"), "{stderr}");
 }
 
 #[test]

@@ -13,7 +13,7 @@ const GLANCE_BYTES: u64 = 512;
 /// # Errors
 ///
 /// The file cannot be opened, or a placeholder is stored instead.
-pub(crate) fn open_input(path: &Path) -> Result<File> {
+pub fn open_input(path: &Path) -> Result<File> {
     let fail = |error: io::Error| Error::io(path, "read", error);
     let mut file = File::open(path).map_err(fail)?;
     // A pipe cannot be read twice.

@@ -27,7 +27,7 @@ pub(crate) mod from_origin;
 pub(crate) mod glance;
 pub(crate) mod gray16;
 pub(crate) mod guard;
-pub(crate) mod input_file;
+mod input_file;
 pub(crate) mod inside;
 mod intrinsics;
 #[cfg(feature = "las")]
@@ -85,6 +85,7 @@ mod wkt;
 mod xml_check;
 
 pub use cloud::{CloudHead, CloudPoint, CloudSource, PoseAt};
+pub use input_file::open_input;
 pub use intrinsics::Intrinsics;
 pub use name_stamps::in_name as stamp_of_name;
 pub use one::{Points, Visit};

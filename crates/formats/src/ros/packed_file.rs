@@ -1,7 +1,7 @@
 use super::chunk::unpacker;
 use super::open::open_plain_file;
 use super::recording::{Message, Recording, Topic};
-use crate::read::input_file::open_input;
+use crate::read::open_input;
 use crate::read::listing::extension_of;
 use crate::spill::{Budget, SpillFile};
 use std::fs::File;
