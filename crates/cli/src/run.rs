@@ -157,11 +157,31 @@ fn is_parallel(command: &Command) -> bool {
         | Command::Local(_)
         | Command::Demo(_)
         | Command::Export(_)
+        | Command::Info(_)
         | Command::Picture(_)
-        | Command::Report(_) => true,
-        #[cfg(feature = "view")]
-        Command::View(_) => true,
-        _ => false,
+        | Command::Report(_)
+        | Command::View(_) => true,
+        Command::Scans(_)
+        | Command::Import(_)
+        | Command::Query(_)
+        | Command::Raycast(_)
+        | Command::Digest(_)
+        | Command::Snapshot(_)
+        | Command::Snapshots(_)
+        | Command::Diff(_)
+        | Command::Revert(_)
+        | Command::Merge(_)
+        | Command::Crop(_)
+        | Command::Clear(_)
+        | Command::Decay(_)
+        | Command::Convert(_)
+        | Command::Push(_)
+        | Command::Pull(_)
+        | Command::Verify(_)
+        | Command::Repair(_)
+        | Command::Share(_)
+        | Command::Completions(_)
+        | Command::Man(_) => false,
     }
 }
 
