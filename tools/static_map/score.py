@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
 """Measures how well a map keeps surfaces and removes moving objects.
 
-    score.py SET MAP.npz RESOLUTION_M MAX_RANGE_M
+    score.py SET MAP.npz RESOLUTION_M MIN_RANGE_M MAX_RANGE_M
 
-SET has scans/*.pcd (binary, with x, y, z and perhaps `label`: 0 static, 1 parked, 2 moving, other: no label) and
-poses_kitti.txt; MAP.npz is the output of `voxtile export MAP -o MAP.npz --what all`. Prints the cells of a table row:
+SET has scans/*.pcd (binary, with x, y, z and perhaps `label`: 0 static, 1 parked, 2 moving, other: no label), or depth
+images in millimetres (scans/*.png) and camera-intrinsics.txt; and poses_kitti.txt. MAP.npz is the output of `voxtile export MAP -o MAP.npz --what all`. Prints the cells of a table row:
 the share of points in occupied voxels and, with labels, the static accuracy (SA: static points in occupied voxels), the
 dynamic accuracy (DA: moving points not in occupied voxels) and AA = sqrt(SA DA), all in percent. These are the measures
 of Zhang et al., "A Dynamic Points Removal Benchmark in Point Cloud Maps" (2023), for voxels in place of points.
@@ -15,9 +15,6 @@ import sys
 from pathlib import Path
 
 import numpy as np
-
-MIN_RANGE_M = 2.0
-
 
 def natural(path):
     return [int(part) if part.isdigit() else part for part in re.split(r"(\d+)", path.name)]
@@ -37,6 +34,16 @@ def points_of(path):
     return xyz, labels
 
 
+def points_of_image(path, camera):
+    """Returns the points of a depth image, shape (n, 3). `camera` is the matrix of intrinsics, shape (3, 3)."""
+    from PIL import Image
+
+    depth_m = np.asarray(Image.open(path)).astype(np.float64) / 1000
+    row, column = np.nonzero((depth_m > 0) & (depth_m < 65))
+    z = depth_m[row, column]
+    return np.stack([(column - camera[0, 2]) * z / camera[0, 0], (row - camera[1, 2]) * z / camera[1, 1], z], axis=1)
+
+
 def keys_of(points, resolution_m):
     """Returns an integer for the voxel of each point."""
     voxels = np.floor(points / resolution_m).astype(np.int64) + (1 << 20)
@@ -44,17 +51,20 @@ def keys_of(points, resolution_m):
 
 
 def main():
-    folder, map_file, resolution_m, max_range_m = Path(sys.argv[1]), sys.argv[2], float(sys.argv[3]), float(sys.argv[4])
+    folder, map_file = Path(sys.argv[1]), sys.argv[2]
+    resolution_m, min_range_m, max_range_m = map(float, sys.argv[3:])
     with np.load(map_file) as voxels:
         is_occupied = voxels["log_odds"] >= 0
         occupied = np.sort(keys_of(voxels["xyz"], resolution_m)[is_occupied])
-    scans = sorted(folder.glob("scans/*.pcd"), key=natural)
+    scans = sorted(folder.glob("scans/*.p[cn][dg]"), key=natural)
+    intrinsics = folder / "camera-intrinsics.txt"
+    camera = np.loadtxt(intrinsics) if intrinsics.exists() else None
     poses = np.loadtxt(folder / "poses_kitti.txt").reshape(-1, 3, 4)
     kept, count = np.zeros(3, np.int64), np.zeros(3, np.int64)  # all, static, moving
     for path, pose in zip(scans, poses):
-        xyz, labels = points_of(path)
+        xyz, labels = points_of(path) if camera is None else (points_of_image(path, camera), None)
         distance_m = np.linalg.norm(xyz, axis=1)
-        used = (distance_m > MIN_RANGE_M) & (distance_m < max_range_m)
+        used = (distance_m > min_range_m) & (distance_m < max_range_m)
         keys = keys_of(xyz[used] @ pose[:, :3].T + pose[:, 3], resolution_m)
         found = np.searchsorted(occupied, keys).clip(max=len(occupied) - 1)
         hit = occupied[found] == keys
