@@ -1,8 +1,8 @@
 use super::chunk::unpacker;
 use super::open::open_plain_file;
 use super::recording::{Message, Recording, Topic};
-use crate::read::open_input;
 use crate::read::listing::extension_of;
+use crate::read::open_input;
 use crate::spill::{Budget, SpillFile};
 use std::fs::File;
 use std::io::{BufReader, Read, Write};
