@@ -341,7 +341,8 @@ impl MapConfig {
         if let Some(guard) = self.rays.clearing().guard() {
             guard.validated()?;
             if self.rays.insert_mode == InsertMode::PerRay {
-                let reason = "guarded clearing needs the marks of a whole scan; use the insert mode per-scan";
+                let reason =
+                    "guarded clearing needs all rays of a scan together; use the insert mode per-scan";
                 return Err(Error::argument("clearing", reason));
             }
         }

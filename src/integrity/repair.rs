@@ -325,7 +325,7 @@ impl<F: FnMut(&Action), P: FnMut(u64, u64)> Repairer<'_, F, P> {
             self.note(ActionKind::Removed, &folder, reason);
         }
         for tile in store.tiles().orphans() {
-            self.quarantine_tile(tile, "commits.log does not name this tile")?;
+            self.quarantine_tile(tile, "commits.log has no entry for this tile")?;
         }
         let mut tiles: Vec<_> = store.tiles().iter().collect();
         tiles.sort_unstable();

@@ -186,7 +186,7 @@ impl<F: FnMut(&Finding), P: FnMut(u64, u64)> Verifier<'_, F, P> {
             return Ok(());
         }
         let path = self.layout.current(tile, TileFile::Table);
-        let finding = wrong(&path, "commits.log does not name this tile");
+        let finding = wrong(&path, "commits.log has no entry for this tile");
         self.report_if_confirmed(finding, Recheck::Folder(tile));
         Ok(())
     }

@@ -37,7 +37,10 @@ impl Part {
             Self::Outside(region) => (region, true),
         };
         if !(0..3).all(|k| region.min[k] < region.max[k]) {
-            let reason = format!("{:?} is not below {:?} along every axis", region.min, region.max);
+            let reason = format!(
+                "the minimum corner {:?} must be below the maximum corner {:?} on every axis",
+                region.min, region.max
+            );
             return Err(Error::argument("region", reason));
         }
         let voxels = grid.voxels_in(region);

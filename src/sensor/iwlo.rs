@@ -122,7 +122,7 @@ impl Iwlo {
             return wrong("the adaptive probability must be above 0 and at most 1");
         }
         if sharpness < 0.0 {
-            return wrong("the sharpness must be at least 0: a stronger echo never weighs less");
+            return wrong("the sharpness must be at least 0: a stronger echo cannot have a lower weight");
         }
         if !(decay_rate >= 0.0
             && (0.0..=1.0).contains(&min_alpha)

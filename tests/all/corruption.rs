@@ -279,7 +279,7 @@ fn check_foreign_files(storage: Storage) {
                 disk.shared().create_folder(folder).unwrap();
                 disk.put(&folder.join(table_name(storage)), &files[table]);
             }),
-            "commits.log does not name this tile",
+            "commits.log has no entry for this tile",
             false,
         ),
     ];

@@ -337,7 +337,7 @@ fn a_stray_tile_folder_is_neither_read_nor_overwritten() {
     copy(&path.join("tile_0_0_0"), &path.join("tile_0_0_7"));
     let mapper = open(&path).unwrap();
     let error = message_of(mapper.tile(TileIndex::new(0, 0, 7)));
-    assert!(error.contains("commits.log does not name this tile"), "{error}");
+    assert!(error.contains("commits.log has no entry for this tile"), "{error}");
 }
 
 #[test]

@@ -11,7 +11,7 @@ pub struct Row {
     pub scans: u64,
     pub points: u64,
     pub skipped: u64,
-    /// Number of voxels with occupancy at the end.
+    /// Number of stored voxels at the end.
     pub n_occ: usize,
     /// Mean number of inflated voxels.
     pub n_inf: f64,

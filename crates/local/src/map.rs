@@ -127,8 +127,8 @@ impl LocalMap {
     ///
     /// # Errors
     ///
-    /// If the position is not finite or outside of the range of voxel indices, or voxels and points exceed 67 million.
-    /// The map is then unchanged.
+    /// Fails if the position is not finite or outside of the range of voxel indices, or if the sum of voxels and points
+    /// exceeds 67 million. The map is then unchanged.
     pub fn insert_relayed(&mut self, position: Point, points: &[Point]) -> Result<LocalReport> {
         self.update(position, points, false)
     }

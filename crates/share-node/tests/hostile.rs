@@ -75,7 +75,7 @@ fn error_lines(process: &mut Process) -> Receiver<String> {
     lines_read
 }
 
-/// Six robots send expensive voxels until the memory is full, and malformed packets. One robot is honest.
+/// Six robots send malformed packets, and voxels that take much memory, until it is full. One robot is honest.
 #[cfg(target_os = "linux")]
 #[test]
 fn a_subscriber_keeps_to_its_memory_and_serves_others_under_hostile_packets() {

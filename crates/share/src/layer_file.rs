@@ -117,7 +117,7 @@ pub fn read_layer_within(
 fn content_of(bytes: &[u8]) -> Result<Vec<VoxelIndex>, FormatError> {
     match Packet::decode(bytes)? {
         Packet::Content { voxels, .. } => Ok(voxels),
-        _ => Err(FormatError::at_offset(0, "a layer file contains a packet that is not content")),
+        _ => Err(FormatError::at_offset(0, "a layer file contains a packet of an unexpected type")),
     }
 }
 

@@ -38,7 +38,8 @@ impl Scene {
     /// Maximum radius of a scene, and maximum range of a ray, in metres.
     pub const MAX_RADIUS_M: f64 = 400.0;
 
-    /// Builds a scene of the boxes that meet the square of `radius_m` metres around a point; others are ignored.
+    /// Builds a scene of the boxes that overlap a square with half an edge of `radius_m` metres around a point. Others
+    /// are ignored.
     pub fn new(mut solids: Vec<Solid>, ground_reflectivity: f64, center: Point, radius_m: f64) -> Self {
         let radius_m = bounded(radius_m);
         let min = [center[0] - radius_m, center[1] - radius_m];

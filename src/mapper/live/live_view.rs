@@ -75,7 +75,7 @@ impl Shared {
             Base::Compact(tile) => tile.decode(grid, index)?,
             Base::OnDisk(version) => self.read_version(index, *version)?,
             Base::Orphan => {
-                let reason = "commits.log does not name this tile";
+                let reason = "commits.log has no entry for this tile";
                 return Err(FormatError::at_offset(0, reason).in_map(self.files.folder(), Some(index)));
             }
         };

@@ -31,7 +31,7 @@ impl UnappliedTile {
             (Base::Compact(tile), _) => tile.decode(grid, index)?,
             (_, Some(location)) => read_stored_table(grid, index, location.clone().open()?)?.table,
             (Base::Orphan, _) => {
-                let reason = "commits.log does not name this tile";
+                let reason = "commits.log has no entry for this tile";
                 return Err(FormatError::at_offset(0, reason).in_map(files.folder(), Some(index)));
             }
             (_, None) => Table::default(),

@@ -145,8 +145,9 @@ impl Clearance {
     }
 }
 
-/// Returns on which sides of a brick's cells, along an axis, there are cells farther from the sensor: some cells of the
-/// brick may be below the sensor, and some above. `first_cell` is the lowest of them, `origin` the sensor's voxel.
+/// Returns in which directions along an axis the cells of a brick are farther from the sensor: downward if a cell of
+/// the brick is below the sensor, upward if one is above it. `first_cell` is the brick's lowest cell, `origin` the
+/// sensor's voxel.
 fn sides_behind(first_cell: i32, origin: i32) -> Sides {
     // The sensor is at the center of its voxel, so a cell is above it if its lower voxel is not below it.
     let lower_voxel = |cell: i32| i64::from(cell) * i64::from(CELL_EDGE);

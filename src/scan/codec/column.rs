@@ -200,7 +200,7 @@ pub(super) struct ColumnReader {
     planes: PlaneReader,
     words: Vec<u64>,
     apart: Vec<u64>,
-    /// Camera of the last column of pixels.
+    /// Camera of the last column that was stored as pixels.
     camera: Option<Pinhole>,
 }
 
@@ -270,6 +270,6 @@ impl ColumnReader {
 fn word_bytes(input: &mut BlockInput<'_>) -> Result<usize, FormatError> {
     match usize::from(input.byte()?) {
         bytes @ 0..=8 => Ok(bytes),
-        _ => Err(input.wrong("words of more than eight bytes")),
+        _ => Err(input.wrong("values of more than eight bytes")),
     }
 }

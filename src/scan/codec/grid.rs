@@ -37,7 +37,7 @@ const STEPS: [f64; 30] = [
 ];
 /// Number of values that are sampled before all are checked.
 const SAMPLE_SIZE: usize = 48;
-/// Bound of the multiples: 2^51. Products of larger ones are not exact.
+/// Maximum number of steps from 0 to a value: 2^51. Products of larger numbers with the step are not exact.
 const MAX_STEPS: f64 = 2_251_799_813_685_248.0;
 /// Maximum difference between a value and its multiple of the step, in units in the last place. Values differ from exact
 /// multiples if the program that wrote the file added an offset.

@@ -251,7 +251,7 @@ impl PlaneReader {
                 decompress(&mut self.zstd, input.bytes(length)?, &mut self.plane, input)?;
             }
             GROUPED if self.above.len() == self.plane.len() => self.take_groups(input)?,
-            _ => return Err(input.wrong("a plane of unknown form")),
+            _ => return Err(input.wrong("a data block of unknown encoding")),
         }
         Ok(())
     }

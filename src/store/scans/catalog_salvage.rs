@@ -22,8 +22,8 @@ pub(crate) enum Salvaged {
     Lost(CatalogEntry),
 }
 
-/// Passes the readable entries of the catalog as of a flush to `put`, in order. Damaged records are skipped. Missing
-/// scans are passed as unlisted, so that scan numbers are contiguous up to that of the flush. A file that is not the
+/// Passes the readable entries of a flush's catalog to `put`, in order. Damaged records are skipped. Missing scans are
+/// passed as unlisted, so that scan numbers are contiguous up to the flush's last scan. A file that is not the
 /// catalog named in the log is skipped as a whole, because it may contain removed scans. Returns the errors found.
 ///
 /// # Errors

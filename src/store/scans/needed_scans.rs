@@ -255,7 +255,7 @@ pub(crate) fn check_segment(disk: &dyn Disk, layout: &Layout, segment: u64, end:
         Some(EntryKind::File(bytes)) if bytes >= end => return Ok(()),
         Some(EntryKind::File(bytes)) => FormatError::at_offset(bytes, "the segment ends early"),
         Some(_) => FormatError::at_offset(0, "not a regular file"),
-        None => FormatError::at_offset(0, "the segment is missing"),
+        None => FormatError::at_offset(0, "the segment of kept scans is missing"),
     };
     Err(error.in_map(&path, None))
 }

@@ -6,7 +6,7 @@ use std::io::{self, Read, Write};
 use std::path::PathBuf;
 use std::sync::Mutex;
 
-/// Length from which a new segment is begun.
+/// Length in bytes from which on a segment is closed and a new one begins.
 const MAX_BYTES: u64 = 256 << 20;
 /// Length and checksum of a block.
 const BLOCK_FRAME_BYTES: u64 = 8;
@@ -97,7 +97,7 @@ impl SegmentReader {
         let path = layout.segment(place.segment);
         let input = disk.open_at(&path, place.offset).map_err(|error| match error.kind() {
             io::ErrorKind::NotFound => {
-                FormatError::at_offset(0, "the segment is missing").in_map(&path, None)
+                FormatError::at_offset(0, "the segment of kept scans is missing").in_map(&path, None)
             }
             _ => Error::io(&path, "open", error),
         })?;

@@ -101,7 +101,7 @@ impl<'a> Tables<'a> {
     /// As for [`Tables::open`].
     pub fn open_at(self, tile: TileIndex, path: PathBuf) -> Result<Option<StoredTile>> {
         if self.store.versions.is_orphan(tile) {
-            let reason = "commits.log does not name this tile";
+            let reason = "commits.log has no entry for this tile";
             return Err(FormatError::at_offset(0, reason).in_map(&path, Some(tile)));
         }
         let version = self.store.versions.version(tile);

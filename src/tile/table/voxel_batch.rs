@@ -20,7 +20,7 @@ enum Found<'a> {
 }
 
 impl<'a> VoxelBatch<'a> {
-    /// Maximum batch size: the memory must remain in the L1 cache until the last stage.
+    /// Maximum number of voxels. What the first stage loads must still be in the L1 cache in the last stage.
     pub(crate) const MAX_VOXELS: usize = 64;
 
     pub(crate) fn new() -> Self {

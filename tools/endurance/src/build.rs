@@ -23,7 +23,7 @@ pub struct Build {
     /// Number of scans that are generated or read before they are inserted one after another. The wall time excludes
     /// work that other threads do while scans are generated.
     pub scans_at_a_time: usize,
-    /// Folder of the map, which is replaced.
+    /// Folder of the map. An existing one is replaced.
     pub folder: PathBuf,
     /// Whether the map is kept on disk.
     pub is_kept: bool,

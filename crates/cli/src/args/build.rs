@@ -18,7 +18,7 @@ pub struct BuildArgs {
     /// Edge length of a tile, in metres, 2 to 1024 whole voxels [default: 10, or the map's]
     #[arg(long, value_name = "M")]
     pub tile_size: Option<f64>,
-    /// Storage format of the tiles of a new map [default: octomap, or the map's]
+    /// Storage format of the tiles of a new map; `voxtile convert` changes it later [default: octomap, or the map's]
     #[arg(long, value_name = "FORM")]
     pub storage: Option<StorageName>,
     #[arg(long, value_name = "SIZE", conflicts_with = "cache_tiles", help = help::MEMORY)]
@@ -29,7 +29,8 @@ pub struct BuildArgs {
     /// Skip points nearer to the sensor than this, in metres [default: 0; with --resume, the earlier value]
     #[arg(long, value_name = "M")]
     pub min_range: Option<f64>,
-    /// Cut rays at this range, in metres: free up to it, no hit [default: 100; with --resume, the earlier value]
+    /// Cut rays at this range, in metres: space before it becomes free, without a hit [default: 100; with --resume, the
+    /// earlier value]
     #[arg(long, value_name = "M")]
     pub max_range: Option<f64>,
     /// Sensor model that turns observations into log-odds [default: log-odds, or the map's]
@@ -59,7 +60,7 @@ pub struct BuildArgs {
     #[arg(long)]
     pub keep_scans: bool,
     /// Map only tiles whose center is in this box (X0 <= x < X1, same for y and z), in metres; -inf and inf are
-    /// allowed. Maps of adjacent boxes merge to the map of the whole [default: all of space; with --resume, the earlier
+    /// allowed. Maps of adjacent boxes can be merged into one map [default: all of space; with --resume, the earlier
     /// value]
     #[arg(long, value_names = ["X0", "Y0", "Z0", "X1", "Y1", "Z1"], num_args = 6, allow_hyphen_values = true)]
     pub region: Option<Vec<f64>>,
@@ -113,7 +114,7 @@ pub struct OctreeArgs {
     /// Cache between updates and the pointer octree; serial and parallel imply --octree pointers [default: off]
     #[arg(long, value_name = "MODE")]
     pub voxel_cache: Option<VoxelCacheName>,
-    /// Maximum number of voxels in a bucket of a voxel cache after a scan, 1 to 65536 [default: 4]
+    /// With a voxel cache: maximum number of voxels that stay in a bucket after a scan, 1 to 65536 [default: 4]
     #[arg(long, value_name = "N")]
     pub tau: Option<usize>,
     /// Number of buckets of each tile's voxel cache, a power of two [default: enough for 3 times the voxels of a scan
@@ -124,7 +125,7 @@ pub struct OctreeArgs {
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum OctreeName {
-    /// View of the voxels themselves; needs no cache
+    /// Computed from the stored voxels
     Bricks,
     /// OctoMap's pointer tree, for comparison: much slower, ten times the memory
     Pointers,
@@ -145,7 +146,7 @@ pub enum StorageName {
     /// Two files per tile that other programs read: iwlo_meta.bin, 18 bytes per voxel, and octree.bt
     #[value(name = "octomap")]
     OctoMap,
-    /// One file per tile, 20 to 40 times smaller; convert changes the format
+    /// One file per tile, 20 to 40 times smaller
     Compact,
 }
 

@@ -10,7 +10,7 @@ pub struct LocalArgs {
     /// Parameter set for the use of the map
     #[arg(long, value_name = "NAME", default_value = "local")]
     pub preset: PresetName,
-    /// Maximum number of voxels with occupancy; 0 for no limit [default: the preset's]
+    /// Maximum number of stored voxels; 0 for no limit [default: the preset's]
     #[arg(long, value_name = "N")]
     pub n_lim: Option<usize>,
     /// Skip points farther from the sensor than this, in metres; inf for none [default: the preset's]

@@ -52,7 +52,7 @@ pub struct ReadArgs {
     /// Skip points in this box, such as the robot itself, in metres
     #[arg(long, value_names = ["X0", "Y0", "Z0", "X1", "Y1", "Z1"], num_args = 6)]
     pub ignore_box: Option<Vec<f64>>,
-    /// Frame of the box; body needs --extrinsic
+    /// Frame of --ignore-box; body needs --extrinsic
     #[arg(long, value_name = "FRAME", default_value = "sensor")]
     pub ignore_frame: FrameName,
     /// LAS with GPS times: duration of a scan, in seconds; 0 reads a file as one scan

@@ -89,7 +89,7 @@ fn pcd_files_with_stamps_take_poses_by_time() {
     assert_eq!(origins_m(&folder, &scans, &["--poses", text(&file)]), [2.0, 3.0]);
     fs::write(&file, poses(0)).unwrap();
     assert_eq!(origins_m(&folder, &scans, &["--poses", text(&file)]), [0.0, 1.0, 2.0, 3.0]);
-    // More poses than files, next to them.
+    // A file of poses next to the scans, with more poses than scans.
     fs::write(folder.path().join("poses_tum.txt"), poses(0) + &poses(4)).unwrap();
     assert_eq!(origins_m(&folder, &scans, &[]), [0.0, 1.0, 2.0, 3.0]);
     // Unrelated clocks.

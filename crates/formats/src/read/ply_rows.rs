@@ -7,8 +7,8 @@ use super::text_line::number;
 use std::collections::VecDeque;
 use voxtile::{Error, Result};
 
-/// Reads elements, one per line. If the first vertex does not match its line, lines are wrapped: elements then follow
-/// each other word by word.
+/// Reads elements, one per line. If the first line has another number of values than a vertex, the file has wrapped
+/// lines; the values are then read without regard to lines.
 pub(super) struct PlyRows {
     lines: Lines,
     /// One value per property.

@@ -92,7 +92,7 @@ const TABLE: [OutputFormat; 18] = [
         ..row("heightmap", Some("png"), "Heights as a 16-bit PNG with a world file",
               files!(heightmap::HeightmapSink::create)) },
     OutputFormat { takes: &[Region, Which, Cell], origin: Origin::Point,
-        ..row("autoware", None, "A folder of PCD files for squares, with Autoware's metadata",
+        ..row("autoware", None, "A folder with a PCD file per grid square, and Autoware's metadata",
               files!(autoware::AutowareSink::create)) },
     OutputFormat { takes: &[],
         refusal: "it always contains the occupied voxels of the whole map in map coordinates; for a part, create a \

@@ -7,7 +7,7 @@ use std::io::{self, Write};
 use voxtile::Error;
 use voxtile::space::Grid;
 
-/// Output file whose coordinates may have another origin than the map's, which is then stored in a companion file.
+/// Output file whose coordinates may have another origin than the map's. A companion file then records that origin.
 pub(super) struct MovedFile<'a> {
     export: &'a Export<'a>,
     /// Companion file; `None` for a stream.

@@ -334,7 +334,7 @@ struct Layout {
     top: usize,
     /// First row of the legend.
     foot: usize,
-    /// Size of a letter's dot in pixels.
+    /// Edge of the squares that letters consist of, in pixels.
     dot: usize,
 }
 

@@ -103,7 +103,7 @@ impl Picture {
         let knows_scans =
             || map.tile_indices().first().is_none_or(|&tile| map.last_scan_of_tile_hint(tile).is_some());
         if self.color_by == ColorBy::LastScan && !knows_scans() {
-            let reason = "the map does not record the last scan of its tiles; choose another color";
+            let reason = "the map does not record the last scan of its tiles; color by something else";
             return Err(Error::argument("color", reason));
         }
         let collected = Collected::of(self, Source::One(map), &progress)?;

@@ -22,7 +22,9 @@ pub fn in_box(map: &LiveMap, request: OctomapInBoxRequest) -> OctomapInBoxRespon
     let OctomapInBoxRequest { min, max, binary } = request;
     let format = if binary { OctreeFormat::Bt } else { OctreeFormat::Ot };
     if !(0..3).all(|k| min[k] < max[k]) {
-        let outcome = Outcome::from(Err(format!("{min:?} is not below {max:?} along every axis")));
+        let outcome = Outcome::from(Err(format!(
+            "the minimum corner {min:?} must be below the maximum corner {max:?} on every axis"
+        )));
         return OctomapInBoxResponse { outcome, map: Octomap::default() };
     }
     match make(map, &map.moment(), &Aabb { min, max }, format) {

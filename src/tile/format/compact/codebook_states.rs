@@ -52,7 +52,7 @@ impl CodebookStates {
         for number in 0..self.len() {
             match palette.intern(self.state(number).map_err(wrong)?) {
                 Ok(id) if usize::from(id) == number + 1 => {}
-                _ => return Err(wrong(format!("state {number} of the codebook is a duplicate"))),
+                _ => return Err(wrong(format!("entry {number} of the codebook is a duplicate"))),
             }
         }
         Ok(palette)

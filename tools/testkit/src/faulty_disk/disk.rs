@@ -91,7 +91,8 @@ impl FaultyDisk {
         self
     }
 
-    /// Ends all faults except unreadable bytes, like free space on a full disk or a new disk with the same content.
+    /// Ends all faults except unreadable bytes, as if space was freed on a full disk, or the disk was replaced by a
+    /// copy.
     pub fn make_room(&self) {
         let mut state = self.state();
         (state.has_space, state.fault) = (true, Fault::None);

@@ -31,7 +31,7 @@ pub fn decode_poses(kind: MessageKind, wire: Wire, bytes: &[u8]) -> Decoded<Vec<
 }
 
 /// Visits the poses of a message, or none of them if it is truncated. A large message is decoded twice for this, so
-/// that its poses are not in memory together.
+/// that never all its poses are in memory at once.
 ///
 /// # Errors
 ///
