@@ -63,7 +63,7 @@ END
     if [[ ${1:-} == --short ]]; then
         rows 0.2 "${lidar%% *}"
     else
-        rows 0.05 "$lidar $camera"
+        rows 0.05 "$camera"
         rows 0.1 "$lidar $camera"
         rows 0.2 "$lidar"
         rows 0.4 "$lidar"
