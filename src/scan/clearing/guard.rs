@@ -101,8 +101,8 @@ impl Clearance {
         full | without_near(approached, |step| marks.hit_cells(step))
     }
 
-    /// Returns those of the given cells behind which, seen from the sensor, there is a hit cell, and none next to them.
-    /// Cells next to a hit in a brick that is not behind may be among them.
+    /// Returns those of the given cells behind which, seen from the sensor, there is a hit cell. Leaves out most cells
+    /// that are next to a hit.
     fn approached_cells(&self, index: VoxelIndex, cells: u64, marks: &impl MarksAround) -> u64 {
         let first: VoxelIndex = index.map(|k| k * CELLS_EDGE);
         let sides = std::array::from_fn(|axis| sides_behind(first[axis], self.origin[axis]));
