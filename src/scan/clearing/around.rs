@@ -15,7 +15,7 @@ pub(crate) fn moved(brick: VoxelIndex, step: Step) -> VoxelIndex {
     std::array::from_fn(|axis| brick[axis] + step[axis])
 }
 
-/// Returns the step of one brick along an axis.
+/// Returns a step along one axis.
 pub(super) fn along(axis: usize, step: i32) -> Step {
     let mut steps = HERE;
     steps[axis] = step;
@@ -118,7 +118,7 @@ pub(super) fn without_near(items: u64, of: impl Fn(Step) -> u64) -> u64 {
 }
 
 /// Returns a value for the bricks below and above along each axis.
-pub(super) fn beside<T>(of: impl Fn(Step) -> T) -> [[T; 2]; 3] {
+pub(super) fn neighbors_along_axes<T>(of: impl Fn(Step) -> T) -> [[T; 2]; 3] {
     std::array::from_fn(|axis| [-1, 1].map(|step| of(along(axis, step))))
 }
 

@@ -1,4 +1,6 @@
-use super::around::{Blocks, HERE, Sides, along, beside, is_empty, near_set, sides_of_voxels, without_near};
+use super::around::{
+    Blocks, HERE, Sides, along, is_empty, near_set, neighbors_along_axes, sides_of_voxels, without_near,
+};
 use super::cells::{between_voxels, block_of_octets, cells_of, eroded_block, eroded_octet, octets_of};
 use super::marks::{Marks, MarksAround};
 use crate::config::Guard;
@@ -89,7 +91,7 @@ impl Clearance {
         if cells.clear == 0 {
             return 0;
         }
-        let full = cells.eroded(|| beside(|step| marks.cells(step)));
+        let full = cells.eroded(|| neighbors_along_axes(|step| marks.cells(step)));
         let rest = cells.clear & !full;
         if rest == 0 || self.guard.approach_cells() == 0 || !marks.may_have_hits() {
             return full;
