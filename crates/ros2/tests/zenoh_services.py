@@ -134,7 +134,7 @@ def main():
     functions = {name: call for name, (call, _) in calls.items()}
     check(functions, lambda: send_malformed(graph, calls["snapshot"][1]), published, diagnostics)
     outside = calls["octomap_in_box"][0](Point(0.0, 0.0, 0.0), Point(0.0, 0.0, 0.0), True)
-    assert not outside.success and "not below" in outside.message
+    assert not outside.success and "must be below" in outside.message
 
 
 if __name__ == "__main__":
