@@ -1,5 +1,5 @@
 use crate::error::Result;
-use crate::persistence::check_points;
+use crate::persistence::{check_points, read_marks};
 use crate::store::{Disk, KeptRecord, Layout, SegmentPlace};
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -31,7 +31,7 @@ impl KeptLocations {
     }
 }
 
-/// Points that were read and are intact, so that points which a map and its snapshots share are read once. Scans are
+/// Points and marks that were read and are intact, so that points which a map and its snapshots share are read once. Scans are
 /// contiguous, so there are few ranges.
 #[derive(Debug, Default)]
 pub(super) struct WholePoints {
@@ -40,20 +40,26 @@ pub(super) struct WholePoints {
 }
 
 impl WholePoints {
-    /// Checks the points of a scan, if they were not checked before.
+    /// Checks the points of a scan and their marks, if they were not checked before.
     ///
     /// # Errors
     ///
     /// Damage or an I/O error.
     pub(super) fn check(&mut self, disk: &dyn Disk, layout: &Layout, scan: &KeptRecord) -> Result<()> {
-        let SegmentPlace { segment, offset, bytes } = scan.place;
+        self.check_once(scan.place, || check_points(disk, layout, scan))?;
+        let marks = scan.moving.map(|marks| marks.place);
+        marks.map_or(Ok(()), |place| self.check_once(place, || read_marks(disk, layout, scan).map(drop)))
+    }
+
+    fn check_once(&mut self, place: SegmentPlace, check: impl FnOnce() -> Result<()>) -> Result<()> {
+        let SegmentPlace { segment, offset, bytes } = place;
         let end = offset.saturating_add(bytes);
         let before = self.ranges.range(..=(segment, offset)).next_back().map(|(&range, &end)| (range, end));
         let before = before.filter(|&((of, _), _)| of == segment);
         if bytes > 0 && before.is_some_and(|(_, known_end)| known_end >= end) {
             return Ok(());
         }
-        check_points(disk, layout, scan)?;
+        check()?;
         let begin = match before {
             Some((range, known_end)) if known_end == offset => range,
             _ => (segment, offset),

@@ -177,7 +177,7 @@ pub(super) fn whole_entries(
             }
             Salvaged::Whole(CatalogEntry::Kept(scan)) => match points.check(disk, layout, &scan) {
                 Ok(()) => {
-                    whole.segments.insert(scan.place.segment);
+                    whole.segments.extend(scan.places().map(|place| place.segment));
                     CatalogEntry::Kept(scan)
                 }
                 Err(error) => {

@@ -1,7 +1,7 @@
 use crate::config::RayConfig;
 use crate::error::Result;
-use crate::persistence::PointReader;
-use crate::scan::{Pose, ScanPoints, TakePoints};
+use crate::persistence::{PointReader, read_marks};
+use crate::scan::{MovingMarks, Pose, ScanPoints, TakePoints};
 use crate::space::Point;
 use crate::store::{Disk, KeptFrame, KeptRecord, Layout};
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
@@ -16,6 +16,7 @@ pub struct KeptScan {
     record: KeptRecord,
     world_from_sensor: Option<Pose>,
     points: Points,
+    moving: Option<Arc<MovingMarks>>,
 }
 
 #[derive(Clone, Debug)]
@@ -42,7 +43,8 @@ impl KeptScan {
             KeptFrame::World(_) => None,
         };
         let points = Points::OnDisk(disk.clone(), layout.clone());
-        let mut scan = Self { record, world_from_sensor, points };
+        let moving = read_marks(&**disk, layout, &record)?.map(Arc::new);
+        let mut scan = Self { record, world_from_sensor, points, moving };
         if scan.record.points <= max_points {
             let (mut points, mut intensities) = (Vec::new(), Vec::new());
             scan.for_each_own_chunk(0..scan.len(), &mut |some, of_some| {
@@ -77,6 +79,13 @@ impl KeptScan {
         self.record.frame = KeptFrame::Sensor(pose_numbers(&world_from_sensor));
         self
     }
+
+    /// Returns the same scan with other marks of moving points.
+    #[must_use]
+    pub(crate) fn with_moving(mut self, moving: MovingMarks) -> Self {
+        self.moving = (moving.marked() > 0).then(|| Arc::new(moving));
+        self
+    }
 }
 
 impl ScanPoints for KeptScan {
@@ -94,6 +103,10 @@ impl ScanPoints for KeptScan {
 
     fn has_intensities(&self) -> bool {
         self.record.has_intensities
+    }
+
+    fn moving(&self) -> Option<&MovingMarks> {
+        self.moving.as_deref()
     }
 
     fn for_each_chunk(&self, range: Range<usize>, take: &mut TakePoints<'_>) -> Result<()> {

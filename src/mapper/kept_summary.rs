@@ -36,8 +36,12 @@ pub struct KeptScanHead {
     pub world_from_sensor: Option<Pose>,
     /// Number of voxel updates when the scan was inserted; a voxel updated twice counts twice.
     pub updates: u64,
-    /// Segment that contains its points.
-    pub(crate) segment: u64,
+    /// Number of points.
+    pub points: u64,
+    /// Number of points that are marked as moving.
+    pub moving_points: u64,
+    /// Segments that contain its points and marks.
+    pub(crate) segments: [u64; 2],
 }
 
 /// Error text for a map without kept scans.
@@ -129,14 +133,25 @@ impl KeptScanHead {
             KeptFrame::Sensor(pose) => Some(pose_of_numbers(pose)),
             KeptFrame::World(_) => None,
         };
-        let KeptRecord { number, stamp_ns, updates, place, .. } = *record;
-        Self { number, stamp_ns, world_from_sensor, updates, segment: place.segment }
+        let KeptRecord { number, stamp_ns, points, updates, place, moving, .. } = *record;
+        let of_marks = moving.map_or(place.segment, |marks| marks.place.segment);
+        let moving_points = moving.map_or(0, |marks| marks.marked);
+        let segments = [place.segment, of_marks];
+        Self { number, stamp_ns, world_from_sensor, updates, points, moving_points, segments }
     }
 
     /// Creates a summary of a scan, for tests.
     #[doc(hidden)]
     pub fn new(number: u64, stamp_ns: Option<i64>, world_from_sensor: Option<Pose>) -> Self {
-        Self { number, stamp_ns, world_from_sensor, updates: 0, segment: 0 }
+        Self {
+            number,
+            stamp_ns,
+            world_from_sensor,
+            updates: 0,
+            points: 0,
+            moving_points: 0,
+            segments: [0; 2],
+        }
     }
 }
 

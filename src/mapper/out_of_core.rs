@@ -6,13 +6,13 @@ use crate::config::{Clearing, MapConfig, RayConfig};
 use crate::error::{Error, Result};
 use crate::persistence::{new_map_id, new_metadata};
 use crate::scan::{
-    Overflow, PointBatch, ScanPoints, ScanReport, ScanTracer, ScanUpdates, Stop, updates_of_hits,
+    MovingMarks, Overflow, PointBatch, ScanPoints, ScanReport, ScanTracer, ScanUpdates, Stop, updates_of_hits,
 };
 use crate::sensor::Evidence;
 use crate::space::{TileBox, TileIndex, TileSelection, VoxelIndex};
 use crate::store::{
-    InputContent, InputRecord, KeptFrame, KeptRecord, MapPath, Metadata, SegmentPlace, SnapshotName,
-    TileStore,
+    InputContent, InputRecord, KeptFrame, KeptMarks, KeptRecord, MapPath, Metadata, SegmentPlace,
+    SnapshotName, TileStore,
 };
 use std::path::Path;
 use std::sync::OnceLock;
@@ -448,9 +448,14 @@ impl OutOfCoreTileMapper {
         work(self.pager().store_mut())
     }
 
-    /// Writes the points of a scan to the archive of kept scans.
-    pub(super) fn write_points(&self, scan: &dyn ScanPoints) -> Result<SegmentPlace> {
+    /// Writes the points of a scan, and its marks of moving points, to the archive of kept scans.
+    pub(super) fn write_points(&self, scan: &dyn ScanPoints) -> Result<(SegmentPlace, Option<KeptMarks>)> {
         self.pager().keep(scan)
+    }
+
+    /// Writes new marks of moving points of a kept scan to the archive of kept scans.
+    pub(super) fn write_marks(&self, marks: &MovingMarks) -> Result<Option<KeptMarks>> {
+        self.pager().keep_marks(marks)
     }
 
     /// Commits a replay; the number of scans does not change.
@@ -567,7 +572,7 @@ impl Mapper for OutOfCoreTileMapper {
 fn kept_record(
     scan: &dyn ScanPoints,
     rays: &RayConfig,
-    place: SegmentPlace,
+    (place, moving): (SegmentPlace, Option<KeptMarks>),
     report: &ScanReport,
     tiles: Vec<TileIndex>,
 ) -> KeptRecord {
@@ -584,6 +589,7 @@ fn kept_record(
         has_intensities: scan.has_intensities(),
         updates: report.hits + report.misses,
         place,
+        moving,
         tiles,
     }
 }

@@ -1,9 +1,9 @@
 use super::{OutOfCoreTileMapper, ShadowMapper};
 use crate::config::{MapConfig, RayConfig};
 use crate::error::Result;
-use crate::scan::{ScanPoints, ScanReport, Stop};
+use crate::scan::{MovingMarks, ScanPoints, ScanReport, Stop};
 use crate::space::{TileIndex, TileSelection};
-use crate::store::{CatalogEntry, SegmentPlace, TileStore};
+use crate::store::{CatalogEntry, KeptMarks, KeptRecord, SegmentPlace, TileStore};
 
 /// Replays kept scans into some tiles of a map and rewrites the catalog of the scans. All of it is one commit; until
 /// then the map is unchanged.
@@ -45,14 +45,21 @@ impl Remapper {
         self.mapper.with_store(|store| store.archive_mut().put(entry))
     }
 
-    /// Copies the points of a scan to a segment that is not going to be removed.
-    pub(crate) fn copy_points(&mut self, place: SegmentPlace) -> Result<SegmentPlace> {
+    /// Copies points or marks of a scan to a segment that is not going to be removed.
+    pub(crate) fn copy(&mut self, place: SegmentPlace) -> Result<SegmentPlace> {
         self.mapper.with_store(|store| store.archive_mut().copy(place))
     }
 
-    /// Writes points that replace those of a scan.
-    pub(crate) fn write_points(&mut self, scan: &dyn ScanPoints) -> Result<SegmentPlace> {
-        self.mapper.write_points(scan)
+    /// Writes points, and their marks, that replace those of a scan.
+    pub(crate) fn write_points(&mut self, scan: &dyn ScanPoints, record: &mut KeptRecord) -> Result<()> {
+        (record.place, record.moving) = self.mapper.write_points(scan)?;
+        record.points = scan.len() as u64;
+        Ok(())
+    }
+
+    /// Writes marks of moving points that replace those of a scan.
+    pub(crate) fn write_marks(&mut self, marks: &MovingMarks) -> Result<Option<KeptMarks>> {
+        self.mapper.write_marks(marks)
     }
 
     /// Swaps in the committed content of a shadow map: its tiles, and its entries as the new catalog.

@@ -1,7 +1,7 @@
 use crate::config::MapConfig;
 use crate::error::{Error, FormatError, Result};
 use crate::persistence::load::read_stored_table;
-use crate::persistence::{TileSaver, check_points, config_from};
+use crate::persistence::{TileSaver, check_points, config_from, read_marks};
 use crate::space::TileIndex;
 use crate::store::{
     KeptRecord, MapPath, Metadata, SnapshotName, TileFile, TileStore, TileVersion, check_segment,
@@ -156,11 +156,17 @@ fn check_kept_scans(store: &TileStore, past: &TileStore) -> Result<()> {
                 Ok(None) | Err(_) => own = None,
             }
         }
-        if next_own.as_ref().is_some_and(|known| known.place == scan.place && known.points == scan.points) {
-            let end = ends.entry(scan.place.segment).or_insert(0);
-            *end = scan.place.offset.saturating_add(scan.place.bytes).max(*end);
+        let is_same = |known: &KeptRecord| {
+            known.place == scan.place && known.points == scan.points && known.moving == scan.moving
+        };
+        if next_own.as_ref().is_some_and(is_same) {
+            for place in scan.places() {
+                let end = ends.entry(place.segment).or_insert(0);
+                *end = place.offset.saturating_add(place.bytes).max(*end);
+            }
         } else {
             check_points(disk, layout, &scan)?;
+            read_marks(disk, layout, &scan)?;
         }
     }
     ends.into_iter().try_for_each(|(segment, end)| check_segment(disk, layout, segment, end))

@@ -7,7 +7,7 @@
 //! copy_tile     a tile of one map -> another map's store, with that map's id
 //! compact_tile  a tile in the compact form, in memory; encoded by packer
 //! io_threads    one saving and one loading thread, each a `Worker`
-//! point_reader  store -> the points of a kept scan
+//! point_reader  store -> the points of a kept scan, and the marks of those that moved
 //! priority      lower priority for background threads
 //! upgrade       a map of the original format -> the same map with id, log and checksums
 //! parameters    MapConfig <-> metadata.json; map_id creates ids
@@ -33,7 +33,7 @@ pub(crate) use io_threads::{IoThreads, Loaded, Saved};
 pub(crate) use map_id::new_map_id;
 pub(crate) use packer::Packer;
 pub(crate) use parameters::{config_from, new_metadata};
-pub(crate) use point_reader::{PointReader, check_points};
+pub(crate) use point_reader::{PointReader, check_points, read_marks};
 pub(crate) use priority::lower_priority;
 pub(crate) use tile_saver::TileSaver;
 pub(crate) use upgrade::upgrade;

@@ -1,5 +1,5 @@
 use crate::error::Result;
-use crate::scan::{MAX_BLOCK_BYTES, PointDecoder};
+use crate::scan::{MAX_BLOCK_BYTES, MovingMarks, PointDecoder};
 use crate::space::Point;
 use crate::store::{self, Disk, KeptRecord, Layout, SegmentPlace, SegmentReader};
 
@@ -55,6 +55,27 @@ impl PointReader {
                     format!("scan {} has {points} points, but its record says {}", scan.number, scan.points);
                 Err(self.blocks.damaged(self.blocks.at(), &reason))
             }
+        }
+    }
+}
+
+/// Reads the marks of moving points of a kept scan, if it has any.
+///
+/// # Errors
+///
+/// Damage or an I/O error.
+pub(crate) fn read_marks(disk: &dyn Disk, layout: &Layout, scan: &KeptRecord) -> Result<Option<MovingMarks>> {
+    let Some(kept) = scan.moving else { return Ok(None) };
+    let mut blocks = SegmentReader::open(disk, layout, kept.place)?;
+    let mut runs = Vec::new();
+    while let Some(block) = blocks.next_block()? {
+        runs.extend_from_slice(block);
+    }
+    match MovingMarks::decode(runs, scan.points).filter(|marks| marks.marked() == kept.marked) {
+        Some(marks) => Ok(Some(marks)),
+        None => {
+            let reason = format!("the marks of moving points of scan {} are invalid", scan.number);
+            Err(blocks.damaged(kept.place.offset, &reason))
         }
     }
 }

@@ -2,7 +2,7 @@ use super::per_ray::OrderedCollector;
 use super::spill::{Overflow, ScanParts};
 use super::trace::check_intensities;
 use super::updates::MappedTiles;
-use super::{ScanPoints, ScanReport, ScanUpdates, Stop};
+use super::{ChunkMarks, ScanPoints, ScanReport, ScanUpdates, Stop};
 use crate::config::MapConfig;
 use crate::error::{Error, Result};
 use crate::sensor::{Observation, SensorModel};
@@ -88,11 +88,17 @@ pub(crate) fn updates_of_hits(
     parts.into_updates(collector.report, false, stop, &mut overflow)
 }
 
-/// Passes points with their intensities (0 if they have none), until `take` returns false.
+/// Passes points that are not marked as moving with their intensities (0 if they have none), until `take` returns
+/// false.
 fn for_each_hit(scan: &dyn ScanPoints, stop: &Stop, mut take: impl FnMut(Point, f32) -> bool) -> Result<()> {
+    let mut marks = ChunkMarks::from(scan.moving(), 0);
     scan.for_each_chunk(0..scan.len(), &mut |points, intensities| {
+        let is_moving = marks.next(points.len());
         let intensity = |number: usize| intensities.map_or(0.0, |intensities| intensities[number]);
-        let goes_on = points.iter().enumerate().all(|(number, &point)| take(point, intensity(number)));
+        let mut numbered = points.iter().enumerate();
+        let goes_on = numbered.all(|(number, &point)| {
+            is_moving.get(number).is_some_and(|is_moving| *is_moving) || take(point, intensity(number))
+        });
         goes_on && !stop.is_set()
     })?;
     stop.check()

@@ -1,4 +1,4 @@
-use super::{Pose, Scan, ScanRef};
+use super::{MovingMarks, Pose, Scan, ScanRef};
 use crate::error::Result;
 use crate::space::Point;
 use std::ops::Range;
@@ -49,6 +49,12 @@ pub trait ScanPoints: Sync {
     /// Same errors as [`ScanPoints::for_each_chunk`].
     fn for_each_own_chunk(&self, range: Range<usize>, take: &mut TakePoints<'_>) -> Result<()> {
         self.for_each_chunk(range, take)
+    }
+
+    /// Marks of the points that hit something that was moving; `None` if there are none. Such a point is no hit, but its
+    /// ray passes free voxels.
+    fn moving(&self) -> Option<&MovingMarks> {
+        None
     }
 
     /// All points, if they are in memory in the form that [`ScanPoints::for_each_chunk`] passes.

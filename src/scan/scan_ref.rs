@@ -1,7 +1,7 @@
 use super::coordinate::Coordinate;
 use super::coordinate::sealed::PointSlice;
 use super::trace::check_count;
-use super::{Pose, ScanPoints, TakePoints};
+use super::{MovingMarks, Pose, ScanPoints, TakePoints};
 use crate::error::{Error, Result};
 use crate::space::Point;
 use std::ops::Range;
@@ -37,6 +37,7 @@ pub struct ScanRef<'a> {
     points: PointSlice<'a>,
     /// One per point.
     intensities: Option<&'a [f32]>,
+    moving: Option<&'a MovingMarks>,
     stamp_ns: Option<i64>,
 }
 
@@ -55,14 +56,17 @@ impl<'a> ScanRef<'a> {
     /// Creates a scan from points in the world frame, seen from `origin`. A point equal to the origin means "no return"
     /// and is skipped.
     pub fn in_world<C: Coordinate>(origin: Point, points: &'a [[C; 3]]) -> Self {
-        Self { frame: Frame::World(origin), points: C::slice(points), intensities: None, stamp_ns: None }
+        Self::new(Frame::World(origin), C::slice(points))
     }
 
     /// Creates a scan from points in the sensor frame and the pose of the sensor. The exact point (0, 0, 0) means "no
     /// return" and is skipped.
     pub fn in_sensor<C: Coordinate>(world_from_sensor: impl Into<Pose>, points: &'a [[C; 3]]) -> Self {
-        let frame = Frame::Sensor(world_from_sensor.into());
-        Self { frame, points: C::slice(points), intensities: None, stamp_ns: None }
+        Self::new(Frame::Sensor(world_from_sensor.into()), C::slice(points))
+    }
+
+    fn new(frame: Frame, points: PointSlice<'a>) -> Self {
+        Self { frame, points, intensities: None, moving: None, stamp_ns: None }
     }
 
     /// Adds an intensity per point.
@@ -73,6 +77,19 @@ impl<'a> ScanRef<'a> {
     pub fn with_intensities(self, intensities: &'a [f32]) -> Result<Self> {
         check_count(self.len(), intensities)?;
         Ok(Self { intensities: Some(intensities), ..self })
+    }
+
+    /// Marks the points that hit something that was moving: they are no hits, but their rays pass free voxels.
+    ///
+    /// # Errors
+    ///
+    /// Fails if the number of marks differs from that of the points.
+    pub fn with_moving(self, moving: &'a MovingMarks) -> Result<Self> {
+        if moving.points() != self.len() as u64 {
+            let reason = format!("{} for {} points; one per point is needed", moving.points(), self.len());
+            return Err(Error::argument("moving", reason));
+        }
+        Ok(Self { moving: Some(moving), ..self })
     }
 
     /// Adds the acquisition time, in nanoseconds since the epoch of its source.
@@ -103,6 +120,10 @@ impl ScanPoints for ScanRef<'_> {
 
     fn has_intensities(&self) -> bool {
         self.intensities.is_some()
+    }
+
+    fn moving(&self) -> Option<&MovingMarks> {
+        self.moving
     }
 
     fn for_each_chunk(&self, range: Range<usize>, take: &mut TakePoints<'_>) -> Result<()> {

@@ -55,7 +55,9 @@ pub use recovery::quarantine::Quarantine;
 pub use recovery::salvage::Salvage;
 pub use recovery::side_folder::SideFolder;
 pub use recovery::staged_map::{StagedMap, staging_folder};
-pub use scans::{CatalogEntry, CatalogVersion, KeptFrame, KeptRecord, ScanArchive, ScanRecord, SegmentPlace};
+pub use scans::{
+    CatalogEntry, CatalogVersion, KeptFrame, KeptMarks, KeptRecord, ScanArchive, ScanRecord, SegmentPlace,
+};
 pub(crate) use scans::{
     KeptAsOf, KeptRecords, MAX_BLOCK_BYTES, Salvaged, SegmentReader, catalog_generations, check_scans,
     check_segment, kept_as_of, read_scans, salvage_entries, whole_fronts,

@@ -6,8 +6,9 @@ use testkit::faulty_disk::{Fault, FaultyDisk};
 use testkit::random_scans::Random;
 use testkit::reference_map::{ReferenceMap, voxels_of};
 use voxtile::integrity::repair;
-use voxtile::operations::{Prefer, Replay, merge, rebuild, remove_points};
-use voxtile::scan::Stop;
+use voxtile::mapper::KeptSummary;
+use voxtile::operations::{Prefer, Replay, mark_moving, merge, rebuild, remove_points};
+use voxtile::scan::{MovingMarks, ScanPoints, ScanRef, Stop};
 use voxtile::{
     Aabb, Clearing, Error, Guard, InMemoryMapper, InsertMode, MapConfig, MapOptions, MapPath, MapQueries,
     MapReader, MapView, Mapper, OutOfCoreTileMapper, Scan,
@@ -137,6 +138,66 @@ fn removed_points_change_neighboring_tiles() {
     let without = Scan { points: second.points[..second.points.len() - 1].to_vec(), ..second.clone() };
     let after = MapReader::open(at(&disk), 0).unwrap();
     assert_eq!(after.digest().unwrap(), digest(&without));
+}
+
+/// Like a removed hit, a marked one turns weak misses into full ones. Without the mark, the map is that of before.
+#[test]
+fn marks_of_moving_points_change_neighboring_tiles() {
+    let config = guarded(1.0, 8.0).with_kept_scans(true);
+    let (origin, post) = ([0.5, 4.5, 4.5], [12.5, 7.5, 4.5]);
+    let wall = (0..30).flat_map(|y| (0..8).map(move |z| [30.5, f64::from(y) + 0.5, f64::from(z) + 0.5]));
+    let points: Vec<_> = wall.chain([post]).collect();
+    let is_post = MovingMarks::new(points.iter().map(|point| *point == post));
+    let none = MovingMarks::new(points.iter().map(|_| false));
+    let first = Scan { origin, points: vec![[13.5, 8.5, 4.5], [12.5, 9.5, 4.5]], intensities: None };
+    let far = Scan { origin: [0.5, 804.5, 4.5], points: vec![[9.5, 804.5, 4.5]], intensities: None };
+    let insert = |mapper: &mut dyn Mapper, marks: &MovingMarks| {
+        mapper.insert_scan(&first).unwrap();
+        let scan = ScanRef::in_world(origin, &points).with_moving(marks).unwrap();
+        mapper.insert_points(&scan).unwrap();
+        mapper.insert_scan(&far).unwrap();
+    };
+    let digest = |marks: &MovingMarks| {
+        let mut mapper = InMemoryMapper::new(config.clone()).unwrap();
+        insert(&mut mapper, marks);
+        mapper.digest().unwrap()
+    };
+    let disk = FaultyDisk::new(Fault::None);
+    let at = || MapPath::on(disk.shared(), Path::new("/map"));
+    let mut mapper = OutOfCoreTileMapper::create(at(), config.clone()).unwrap();
+    insert(&mut mapper, &none);
+    mapper.flush().unwrap();
+    drop(mapper);
+    for marks in [&is_post, &none, &is_post] {
+        let of_scan = marks.clone();
+        let summary = KeptSummary::read(at()).unwrap();
+        let done =
+            mark_moving(&summary, [2], move |_| Ok(of_scan.clone()), &Replay::default(), |_, _| ()).unwrap();
+        assert!(done.tiles_mapped > 2 && done.tiles_mapped < done.tiles, "{done:?}");
+        let map = MapReader::open(at(), 0).unwrap();
+        assert_eq!(map.digest().unwrap(), digest(marks));
+        let kept = map.kept_scans().unwrap().nth(1).unwrap().unwrap();
+        assert_eq!(kept.moving(), Some(marks).filter(|marks| marks.marked() > 0));
+        assert_eq!(KeptSummary::read(at()).unwrap().scans()[1].moving_points, marks.marked());
+    }
+    assert_ne!(digest(&is_post), digest(&none));
+
+    // Another map from these scans keeps the marks.
+    let map = MapReader::open(at(), 0).unwrap();
+    let other = || MapPath::on(disk.shared(), Path::new("/other"));
+    rebuild(&map, other(), config.clone(), |rays| *rays, &Stop::default(), |_, _| ()).unwrap();
+    let rebuilt = MapReader::open(other(), 0).unwrap();
+    assert_eq!(rebuilt.digest().unwrap(), map.digest().unwrap());
+    assert_eq!(KeptSummary::read(other()).unwrap().scans()[1].moving_points, 1);
+
+    // Marks of another number of points are refused, and the map is unchanged.
+    let before = map.digest().unwrap();
+    let wrong = |_| Ok(MovingMarks::new([true; 3]));
+    let summary = KeptSummary::read(at()).unwrap();
+    let refused = mark_moving(&summary, [2], wrong, &Replay::default(), |_, _| ()).unwrap_err();
+    assert!(refused.to_string().contains("3 for the 241 points of scan 2"), "{refused}");
+    assert_eq!(MapReader::open(at(), 0).unwrap().digest().unwrap(), before);
+    assert!(ScanRef::in_world(origin, &points).with_moving(&MovingMarks::new([true])).is_err());
 }
 
 #[test]

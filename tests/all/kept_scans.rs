@@ -128,6 +128,7 @@ impl Writer {
             has_intensities: false,
             updates: 0,
             place,
+            moving: None,
             tiles: Vec::new(),
         })));
     }

@@ -51,19 +51,21 @@ fn snapshots() -> Life {
     Life::new(config(), acts)
 }
 
-/// Scans are moved and removed, before and after a snapshot.
+/// Scans are moved, marked and removed, before and after a snapshot.
 fn replays() -> Life {
     let acts = vec![
         Act::Scans(0..5),
         Act::Move { seed: 7, rest: Some(1) },
         Act::Snapshot("a"),
         Act::RemoveScans(2, 3),
+        Act::Mark { seed: 5, rest: None },
         Act::Scans(5..7),
         Act::RemovePoints(region(2.0, 4.0)),
         Act::Move { seed: 9, rest: None },
         Act::Revert("a"),
         Act::MoveOnline { seed: 3, rest: Some(2), meanwhile: 7..10 },
         Act::Delete("a"),
+        Act::Mark { seed: 6, rest: Some(2) },
         Act::RemoveScans(6, 6),
         Act::Scans(10..11),
     ];
@@ -124,7 +126,7 @@ fn power_cuts_some_time_after_a_kill() {
 fn random_acts(random: &mut Random) -> Vec<Act> {
     let (mut acts, mut snapshots) = (vec![Act::Scans(0..4)], Vec::new());
     for step in 1..12 {
-        let act = match random.below(8) {
+        let act = match random.below(10) {
             0 => Act::Scans(10 * step..10 * step + 1 + random.below(3)),
             1 | 2 => Act::MoveOnline {
                 seed: random.next(),
@@ -134,7 +136,9 @@ fn random_acts(random: &mut Random) -> Vec<Act> {
             3 => Act::Move { seed: random.next(), rest: Some(random.below(4)) },
             4 => Act::Move { seed: random.next(), rest: None },
             5 => Act::RemovePoints(region(random.between(-2.0, 8.0), 9.0)),
-            6 => {
+            6 => Act::Mark { seed: random.next(), rest: Some(random.below(4)) },
+            7 => Act::Mark { seed: random.next(), rest: None },
+            8 => {
                 let name = ["a", "b", "c", "d", "e", "f", "g", "h", "i", "j", "k", "l"][step as usize];
                 snapshots.push(name);
                 Act::Snapshot(name)

@@ -251,7 +251,7 @@ fn a_map_with_snapshots() -> FaultyDisk {
     for (input, seeds) in [("first", 0..3), ("second", 3..5)] {
         mapper.begin_input(input).unwrap();
         for seed in seeds {
-            let Taken { points, intensities, pose } = Taken::new(seed);
+            let Taken { points, intensities, pose, .. } = Taken::new(seed);
             let scan = ScanRef::in_sensor(pose, &points).with_stamp_ns(seed as i64);
             mapper.insert_points(&scan.with_intensities(&intensities).unwrap()).unwrap();
         }

@@ -3,11 +3,11 @@ use crate::config::MapConfig;
 use crate::error::{Error, Result};
 use crate::mapper::statistics::{IoCounts, MapStatistics};
 use crate::persistence::{CompactTile, IoThreads, Loaded, Saved, TileSaver, load, new_metadata, upgrade};
-use crate::scan::{PackedUpdates, PointBlocks, ScanPoints, TileUpdates};
+use crate::scan::{MAX_BLOCK_BYTES, MovingMarks, PackedUpdates, PointBlocks, ScanPoints, TileUpdates};
 use crate::space::{TileIndex, TileTable};
 use crate::store::{
-    BegunCommit, CatalogEntry, InputRecord, Metadata, SegmentPlace, SnapshotName, SpillFile, SpillFiles,
-    TileStore, TileVersion, TileWriter,
+    BegunCommit, CatalogEntry, InputRecord, KeptMarks, Metadata, SegmentPlace, SnapshotName, SpillFile,
+    SpillFiles, TileStore, TileVersion, TileWriter,
 };
 use crate::tile::{Table, Tile};
 use std::time::{Duration, Instant};
@@ -293,12 +293,12 @@ impl TileDisk {
         upgrade(store, saver, config, |map_id| new_metadata(config, map_id, inputs))
     }
 
-    /// Writes the points of a scan to be kept.
+    /// Writes the points of a scan to be kept, and its marks of moving points if there are any.
     ///
     /// # Errors
     ///
     /// Fails if points cannot be read or written; nothing is kept then.
-    pub(super) fn keep(&mut self, scan: &dyn ScanPoints) -> Result<SegmentPlace> {
+    pub(super) fn keep(&mut self, scan: &dyn ScanPoints) -> Result<(SegmentPlace, Option<KeptMarks>)> {
         let (archive, blocks) = (self.store.archive_mut(), &mut self.blocks);
         archive.begin_scan()?;
         blocks.begin();
@@ -307,8 +307,42 @@ impl TileDisk {
             written = blocks.push(points, intensities, put);
             written.is_ok()
         });
-        match read.and(written).and_then(|()| blocks.end(scan.has_intensities(), put)) {
-            Ok(()) => Ok(archive.end_scan()),
+        let mut kept = read.and(written).and_then(|()| blocks.end(scan.has_intensities(), put));
+        let place = archive.end_scan();
+        let mut moving = None;
+        if let Some(marks) = scan.moving().filter(|marks| marks.marked() > 0) {
+            let mut blocks = marks.as_bytes().chunks(MAX_BLOCK_BYTES);
+            kept = kept.and_then(|()| blocks.try_for_each(|block| archive.push_block(block)));
+            // The marks follow the points.
+            let end = place.offset + place.bytes;
+            let bytes = archive.end_scan().bytes - place.bytes;
+            moving = Some(KeptMarks {
+                marked: marks.marked(),
+                place: SegmentPlace { offset: end, bytes, ..place },
+            });
+        }
+        match kept {
+            Ok(()) => Ok((place, moving)),
+            Err(error) => {
+                archive.give_up_scan();
+                Err(error)
+            }
+        }
+    }
+
+    /// Writes new marks of moving points; `None` if no point is marked.
+    ///
+    /// # Errors
+    ///
+    /// An I/O error; nothing is written then.
+    pub(super) fn keep_marks(&mut self, marks: &MovingMarks) -> Result<Option<KeptMarks>> {
+        if marks.marked() == 0 {
+            return Ok(None);
+        }
+        let archive = self.store.archive_mut();
+        archive.begin_scan()?;
+        match marks.as_bytes().chunks(MAX_BLOCK_BYTES).try_for_each(|block| archive.push_block(block)) {
+            Ok(()) => Ok(Some(KeptMarks { marked: marks.marked(), place: archive.end_scan() })),
             Err(error) => {
                 archive.give_up_scan();
                 Err(error)

@@ -8,11 +8,12 @@ use super::write_buffer::WriteBuffer;
 use crate::config::MapConfig;
 use crate::error::{Error, Result};
 use crate::mapper::statistics::{MapStatistics, MemoryCounts};
-use crate::scan::{PackedUpdates, ScanPoints, ScanUpdates, TileUpdates};
+use crate::scan::{MovingMarks, PackedUpdates, ScanPoints, ScanUpdates, TileUpdates};
 use crate::sensor::Evidence;
 use crate::space::{TileIndex, TileSpace, VoxelIndex};
 use crate::store::{
-    CatalogEntry, InputRecord, KeptRecord, ScanRecord, SegmentPlace, SnapshotName, TileReader, TileStore,
+    CatalogEntry, InputRecord, KeptMarks, KeptRecord, ScanRecord, SegmentPlace, SnapshotName, TileReader,
+    TileStore,
 };
 use crate::tile::{Table, Tile};
 use rustc_hash::FxHashMap;
@@ -147,9 +148,17 @@ impl TilePager<'_> {
     }
 
     /// Writes the points of a scan to be kept. The caller then records the scan or calls [`Self::discard_kept`].
-    pub(in crate::mapper) fn keep(&mut self, scan: &dyn ScanPoints) -> Result<SegmentPlace> {
+    pub(in crate::mapper) fn keep(
+        &mut self,
+        scan: &dyn ScanPoints,
+    ) -> Result<(SegmentPlace, Option<KeptMarks>)> {
         self.upgrade()?;
         self.wait(|disk| disk.keep(scan))
+    }
+
+    /// Writes new marks of moving points of a kept scan.
+    pub(in crate::mapper) fn keep_marks(&mut self, marks: &MovingMarks) -> Result<Option<KeptMarks>> {
+        self.wait(|disk| disk.keep_marks(marks))
     }
 
     /// Discards the points of a scan that were written but not recorded.

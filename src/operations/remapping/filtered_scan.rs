@@ -1,6 +1,6 @@
 use crate::error::Result;
 use crate::mapper::KeptScan;
-use crate::scan::{Pose, ScanPoints, TakePoints};
+use crate::scan::{ChunkMarks, MovingMarks, MovingMarksBuilder, Pose, ScanPoints, TakePoints};
 use crate::space::{Aabb, Point};
 use std::ops::Range;
 
@@ -10,17 +10,26 @@ pub(super) struct FilteredScan<'a> {
     region: Aabb,
     is_inside: bool,
     points: usize,
+    moving: Option<MovingMarks>,
 }
 
 impl<'a> FilteredScan<'a> {
     pub(super) fn new(scan: &'a KeptScan, region: Aabb, is_inside: bool) -> Result<Self> {
-        let mut filtered = Self { scan, region, is_inside, points: 0 };
-        let mut points = 0;
+        let mut filtered = Self { scan, region, is_inside, points: 0, moving: None };
+        let (mut points, mut marks) = (0, ChunkMarks::from(scan.moving(), 0));
+        let mut moving = MovingMarksBuilder::default();
         scan.for_each_chunk(0..scan.len(), &mut |some, _| {
-            points += some.iter().filter(|point| filtered.takes(point)).count();
+            let is_moving = marks.next(some.len());
+            for (number, point) in some.iter().enumerate() {
+                if filtered.takes(point) {
+                    points += 1;
+                    moving.push(is_moving.get(number).is_some_and(|is_moving| *is_moving));
+                }
+            }
             true
         })?;
         filtered.points = points;
+        filtered.moving = scan.moving().map(|_| moving.finish());
         Ok(filtered)
     }
 
@@ -79,6 +88,10 @@ impl ScanPoints for FilteredScan<'_> {
 
     fn has_intensities(&self) -> bool {
         self.scan.has_intensities()
+    }
+
+    fn moving(&self) -> Option<&MovingMarks> {
+        self.moving.as_ref()
     }
 
     fn for_each_chunk(&self, range: Range<usize>, take: &mut TakePoints<'_>) -> Result<()> {

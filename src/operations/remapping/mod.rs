@@ -1,4 +1,4 @@
-//! Changes of scans after mapping: new poses, and removal of scans or points. Affected tiles are replayed.
+//! Changes of scans after mapping: new poses, removal of scans or points, marks of moving points. Affected tiles are replayed.
 //!
 //! ```text
 //! change of scans -> revision: affected tiles -> replay of all scans in these tiles, in order -> one commit
@@ -9,6 +9,7 @@
 
 mod completion;
 mod filtered_scan;
+mod mark_moving;
 mod new_poses;
 mod online_remap;
 mod rebuild;
@@ -19,6 +20,7 @@ mod replay;
 mod retiling;
 mod revision;
 
+pub use mark_moving::mark_moving;
 pub use new_poses::NewPoses;
 pub use online_remap::OnlineRemap;
 pub use rebuild::{Rebuilt, rebuild};

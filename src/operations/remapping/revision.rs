@@ -2,27 +2,62 @@ use super::completion::release;
 use super::filtered_scan::FilteredScan;
 use super::replay::{Replay, Replayed};
 use crate::config::{GUARD_REACH, MapConfig};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::mapper::{KeptScan, KeptSummary, Remapper, TileFinder};
 use crate::persistence::config_from;
-use crate::scan::{Pose, ScanPoints, ScanReport};
-use crate::space::{Aabb, TileBox, TileIndex, TileSelection};
+use crate::scan::{ChunkMarks, MovingMarks, Pose, ScanPoints, ScanReport};
+use crate::space::{Aabb, Grid, TileBox, TileIndex, TileSelection};
 use crate::store::{CatalogEntry, Disk, KeptRecord, Layout, TileStore};
 use rustc_hash::{FxHashMap, FxHashSet};
 use std::collections::BTreeSet;
+use std::fmt;
 use std::sync::Arc;
 use std::time::Instant;
 
 /// Change of a scan. Other scans are unchanged.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub(super) enum Change {
     Move(Pose),
     Remove,
     /// Removes the points in a box.
     Filter(Aabb),
+    /// Marks other points as moving than before.
+    Mark(MarkSource),
 }
 
 pub(super) type Changes = FxHashMap<u64, Change>;
+
+/// Source of new marks of moving points, by the number of the scan.
+#[derive(Clone)]
+pub(super) struct MarkSource(pub(super) Arc<dyn Fn(u64) -> Result<MovingMarks> + Send + Sync>);
+
+impl fmt::Debug for MarkSource {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("MarkSource")
+    }
+}
+
+impl MarkSource {
+    /// Returns the new marks of a scan.
+    ///
+    /// # Errors
+    ///
+    /// Errors of the source, and marks that do not match the points.
+    fn of(&self, scan: &KeptScan) -> Result<MovingMarks> {
+        let marks = (self.0)(scan.number())?;
+        match marks.points() == scan.record().points {
+            true => Ok(marks),
+            false => {
+                let (number, points) = (scan.number(), scan.record().points);
+                let reason = format!(
+                    "{} for the {points} points of scan {number}; one per point is needed",
+                    marks.points()
+                );
+                Err(Error::argument("marks", reason))
+            }
+        }
+    }
+}
 
 /// If more than one third of all updates belong to changed scans, all tiles are replayed: finding the affected tiles
 /// would cost more than it saves.
@@ -67,9 +102,12 @@ impl Revision {
             counts.updates = counts.updates.saturating_add(scan.updates);
             if let Some(change) = changes.get(&scan.number) {
                 counts.scans_changed += 1;
-                changed_updates = changed_updates.saturating_add(scan.updates);
+                // Other marks change few tiles, which are found without tracing.
+                if !matches!(change, Change::Mark(_)) {
+                    changed_updates = changed_updates.saturating_add(scan.updates);
+                }
                 if let Change::Remove | Change::Filter(_) = change {
-                    segments.insert(scan.segment);
+                    segments.extend(scan.segments);
                 }
             }
         }
@@ -112,8 +150,8 @@ impl Revision {
         let mut records = store.archive().records()?;
         while let Some(record) = records.next_kept()? {
             self.how.stop.check()?;
-            let Some(&change) = self.changes.get(&record.number) else { continue };
-            if !matches!(change, Change::Filter(_)) {
+            let Some(change) = self.changes.get(&record.number) else { continue };
+            if let Change::Move(_) | Change::Remove = change {
                 tiles.extend(record.tiles.iter().copied());
             }
             if matches!(change, Change::Remove) {
@@ -122,22 +160,24 @@ impl Revision {
             let scan = self.open(store.layout(), record)?;
             let (rays, updates) = (*scan.rays(), scan.record().updates);
             tiles.extend(match change {
-                Change::Move(pose) => finder.tiles_of(&scan.with_pose(pose), &rays, store.folder())?,
+                Change::Move(pose) => finder.tiles_of(&scan.with_pose(*pose), &rays, store.folder())?,
                 Change::Filter(region) => {
-                    let lost = FilteredScan::new(&scan, region, true)?;
+                    let lost = FilteredScan::new(&scan, *region, true)?;
                     finder.tiles_of(&lost, &rays, store.folder())?
                 }
+                Change::Mark(marks) => tiles_of_marks(&config.grid, &scan, &marks.of(&scan)?)?,
                 Change::Remove => Vec::new(),
             });
             *looked_at += updates;
         }
-        let removes_points = self.changes.values().any(|change| matches!(change, Change::Filter(_)));
-        if removes_points && config.rays.clearing().guard().is_some() {
-            // With guarded clearing, a removed hit may change nearby misses from weak to full, also in tiles that its
-            // ray did not pass.
+        let changes_hits =
+            self.changes.values().any(|change| matches!(change, Change::Filter(_) | Change::Mark(_)));
+        if changes_hits && config.rays.clearing().guard().is_some() {
+            // With guarded clearing, a hit makes nearby misses weak, also in tiles that its ray did not pass.
             let reach = config.grid.tiles_within(GUARD_REACH);
             let near = |tile| TileBox::new(tile, tile).grown(reach).tiles();
-            tiles = tiles.into_iter().flat_map(near).filter(|tile| store.tiles().contains(*tile)).collect();
+            let exist: Vec<_> = tiles.iter().flat_map(|&tile| near(tile)).collect();
+            tiles.extend(exist.into_iter().filter(|tile| store.tiles().contains(*tile)));
         }
         Ok(tiles)
     }
@@ -222,7 +262,7 @@ impl Revision {
             };
             progress(done, self.counts.scans);
             done += 1;
-            let (number, change) = (record.number, self.changes.get(&record.number).copied());
+            let (number, change) = (record.number, self.changes.get(&record.number).cloned());
             if matches!(change, Some(Change::Remove)) {
                 remapper.put(&CatalogEntry::Removed(number, number))?;
                 continue;
@@ -232,14 +272,25 @@ impl Revision {
             if change.is_some() || touched.has_any_of(&record) {
                 let scan = self.open(&layout, record)?;
                 record = self.map_scan(&mut remapper, scan, change, &touched)?;
-            } else if self.segments.contains(&record.place.segment) {
-                record.place = remapper.copy_points(record.place)?;
+            } else {
+                self.copy_out(&mut remapper, &mut record)?;
             }
             remapper.put(&CatalogEntry::Kept(Box::new(record)))?;
         }
         progress(done, self.counts.scans);
         let released = remapper.finish(have_poses_changed, release)?;
         Ok((self.counts, released))
+    }
+
+    /// Copies the points and marks of a scan out of segments that are going to be removed.
+    fn copy_out(&self, remapper: &mut Remapper, record: &mut KeptRecord) -> Result<()> {
+        let places = [Some(&mut record.place), record.moving.as_mut().map(|marks| &mut marks.place)];
+        for place in places.into_iter().flatten() {
+            if self.segments.contains(&place.segment) {
+                *place = remapper.copy(*place)?;
+            }
+        }
+        Ok(())
     }
 
     /// Inserts a scan into the affected tiles. Returns its new record.
@@ -251,22 +302,31 @@ impl Revision {
         touched: &Touched,
     ) -> Result<KeptRecord> {
         let is_moved = matches!(change, Some(Change::Move(_)));
-        let scan = match change {
-            Some(Change::Move(pose)) => scan.with_pose(pose),
-            _ => scan,
-        };
-        let mut record = scan.record().clone();
+        let (mut record, mut scan) = (scan.record().clone(), scan);
         let rest;
         let points: &dyn ScanPoints = match change {
             Some(Change::Filter(region)) => {
                 rest = FilteredScan::new(&scan, region, false)?;
-                record.place = remapper.write_points(&rest)?;
-                record.points = rest.len() as u64;
+                remapper.write_points(&rest, &mut record)?;
                 &rest
             }
-            _ => {
-                if self.segments.contains(&record.place.segment) {
-                    record.place = remapper.copy_points(record.place)?;
+            change => {
+                self.copy_out(remapper, &mut record)?;
+                match change {
+                    Some(Change::Move(pose)) => {
+                        scan = scan.with_pose(pose);
+                        record.frame = scan.record().frame.clone();
+                    }
+                    Some(Change::Mark(marks)) => {
+                        let marks = marks.of(&scan)?;
+                        // Hits that return may be in tiles that the scan did not touch without them.
+                        record.tiles.extend(tiles_of_marks(&touched.config.grid, &scan, &marks)?);
+                        record.tiles.sort_unstable();
+                        record.tiles.dedup();
+                        record.moving = remapper.write_marks(&marks)?;
+                        scan = scan.with_moving(marks);
+                    }
+                    _ => {}
                 }
                 &scan
             }
@@ -311,4 +371,19 @@ impl Revision {
         };
         Ok(record)
     }
+}
+
+/// Returns the tiles of the points whose marks differ from those of the scan, in no order. They include all tiles in
+/// which the scan gains or loses hits.
+fn tiles_of_marks(grid: &Grid, scan: &KeptScan, new: &MovingMarks) -> Result<Vec<TileIndex>> {
+    let (mut old, mut new) = (ChunkMarks::from(scan.moving(), 0), ChunkMarks::from(Some(new), 0));
+    let mut tiles = FxHashSet::default();
+    scan.for_each_chunk(0..scan.len(), &mut |points, _| {
+        let (old, new) = (old.next(points.len()), new.next(points.len()));
+        let is_set = |marks: &[bool], number: usize| marks.get(number).is_some_and(|is_set| *is_set);
+        let differs = |number: &usize| is_set(old, *number) != is_set(new, *number);
+        tiles.extend((0..points.len()).filter(differs).filter_map(|number| grid.tile_of(points[number])));
+        true
+    })?;
+    Ok(tiles.into_iter().collect())
 }

@@ -2,7 +2,6 @@ use super::scan_tracer::{ScanTracer, TraceRules, origin_voxel};
 use super::trace_limit::{CollectorLimit, TraceLimit};
 use crate::config::RayConfig;
 use crate::error::Result;
-use crate::scan::ScanReport;
 use crate::scan::clearing::Clearance;
 use crate::scan::coherence::{sampling_passes, single_pass};
 use crate::scan::pages::{MAX_RAYS, Window};
@@ -15,6 +14,7 @@ use crate::scan::scan_points::ScanPoints;
 use crate::scan::spill::ScanParts;
 use crate::scan::stop::Stop;
 use crate::scan::updates::{MappedTiles, ScanUpdates};
+use crate::scan::{ChunkMarks, ScanReport};
 use crate::sensor::{Observation, SensorModel};
 use crate::space::{Grid, Point, TileSelection};
 use rayon::prelude::*;
@@ -140,6 +140,7 @@ impl<'a> ScanRays<'a> {
             let mut report = ScanReport { points: range.len() as u64, ..ScanReport::default() };
             let mut batch = Vec::with_capacity(BATCH);
             let (mut seen, mut extend_at) = (0, 0);
+            let mut marks = ChunkMarks::from(self.points.moving(), range.start);
             self.points.for_each_chunk(range, &mut |points, intensities| {
                 // Extending the prefixes takes equally long for each chunk, but later chunks add less to them. So they
                 // are extended whenever the number of points has doubled.
@@ -148,12 +149,19 @@ impl<'a> ScanRays<'a> {
                     extend_at = 2 * (seen + points.len());
                 }
                 seen += points.len();
+                let is_moving = marks.next(points.len());
                 for pass in
                     if extends { sampling_passes(0..points.len()) } else { single_pass(0..points.len()) }
                 {
                     collector.extend_prefixes(&self.origin, pass.squares, self.cut.as_ref());
                     for number in pass.points() {
-                        batch.extend(self.ray(points[number], intensity(intensities, number), &mut report));
+                        let intensity = intensity(intensities, number);
+                        batch.extend(self.ray(
+                            points[number],
+                            intensity,
+                            is_set(is_moving, number),
+                            &mut report,
+                        ));
                         if batch.len() == BATCH {
                             collector.take(&self.origin, &batch, needs_intensity, parts);
                             batch.clear();
@@ -233,11 +241,14 @@ impl<'a> ScanRays<'a> {
         is_full_for: impl Fn(&mut PerRayCollector, &SlabRay<'_>) -> bool,
         report: &mut ScanReport,
     ) -> Result<()> {
+        let mut marks = ChunkMarks::from(self.points.moving(), range.start);
         self.points.for_each_chunk(range, &mut |points, intensities| {
+            let is_moving = marks.next(points.len());
             for (number, &point) in points.iter().enumerate() {
                 let before = *report;
                 report.points += 1;
-                let Some(end) = self.ray(point, intensity(intensities, number), report) else { continue };
+                let (intensity, is_moving) = (intensity(intensities, number), is_set(is_moving, number));
+                let Some(end) = self.ray(point, intensity, is_moving, report) else { continue };
                 let ray = SlabRay::new(&self.origin, end);
                 if is_full_for(collector, &ray) {
                     *report = before;
@@ -283,11 +294,12 @@ impl<'a> ScanRays<'a> {
     ) -> Result<ScanReport> {
         let range = 0..self.points.len();
         let mut report = ScanReport { points: range.len() as u64, ..ScanReport::default() };
+        let mut marks = ChunkMarks::from(self.points.moving(), range.start);
         self.points.for_each_chunk(range, &mut |points, intensities| {
+            let is_moving = marks.next(points.len());
             for (number, &point) in points.iter().enumerate() {
-                let Some(end) = self.ray(point, intensity(intensities, number), &mut report) else {
-                    continue;
-                };
+                let (intensity, is_moving) = (intensity(intensities, number), is_set(is_moving, number));
+                let Some(end) = self.ray(point, intensity, is_moving, &mut report) else { continue };
                 let ray = SlabRay::new(&self.origin, end);
                 ray.for_each_exactly(|voxel| collector.push(voxel, Observation::Miss));
                 if let Some(intensity) = end.hit {
@@ -376,9 +388,10 @@ impl<'a> ScanRays<'a> {
         Ok((grid.to_voxel_units(low), grid.to_voxel_units(high)))
     }
 
-    /// Returns the end of the ray to a point; `None` if the point is skipped or its ray crosses no mapped tile.
+    /// Returns the end of the ray to a point; `None` if the point is skipped or its ray crosses no mapped tile. A point
+    /// that is marked as moving is no hit.
     #[inline]
-    fn ray(&self, point: Point, intensity: f32, report: &mut ScanReport) -> Option<RayEnd> {
+    fn ray(&self, point: Point, intensity: f32, is_moving: bool, report: &mut ScanReport) -> Option<RayEnd> {
         if self.stop.is_set() {
             return None;
         }
@@ -404,7 +417,7 @@ impl<'a> ScanRays<'a> {
         }
         report.cut_at_max_range += u64::from(!is_hit);
         let hit = Observation::Hit(intensity);
-        let hit = (is_hit && self.model.is_evidence(hit)).then_some(intensity);
+        let hit = (is_hit && !is_moving && self.model.is_evidence(hit)).then_some(intensity);
         let end = RayEnd { point: end, voxel: last, hit, span: SlabSpan::WHOLE };
         match &self.cut {
             None => Some(end),
@@ -447,6 +460,11 @@ fn larger(a: Point, b: Point) -> Point {
 fn part_of(points: &Range<usize>, part: usize, parts: usize) -> Range<usize> {
     let at = |part| points.start + points.len() * part / parts;
     at(part)..at(part + 1)
+}
+
+#[inline]
+fn is_set(marks: &[bool], number: usize) -> bool {
+    marks.get(number).is_some_and(|is_set| *is_set)
 }
 
 #[inline]

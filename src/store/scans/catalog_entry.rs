@@ -22,6 +22,15 @@ pub enum KeptFrame {
     World(Point),
 }
 
+/// Location of the marks of the points of a kept scan that hit something that was moving.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct KeptMarks {
+    /// Number of marked points, at least 1.
+    pub marked: u64,
+    /// Location of the marks.
+    pub place: SegmentPlace,
+}
+
 /// Record of a kept scan.
 #[derive(Clone, Debug, PartialEq)]
 pub struct KeptRecord {
@@ -41,6 +50,8 @@ pub struct KeptRecord {
     pub updates: u64,
     /// Location of the points.
     pub place: SegmentPlace,
+    /// Marks of moving points, if there are any.
+    pub moving: Option<KeptMarks>,
     /// Tiles that the scan changes, in order.
     pub tiles: Vec<TileIndex>,
 }
@@ -68,6 +79,7 @@ const OPERATION: u8 = 5;
 
 const IS_IN_WORLD: u8 = 1;
 const HAS_INTENSITIES: u8 = 2;
+const HAS_MOVING: u8 = 8;
 const HAS_STAMP: u8 = 4;
 
 impl KeptRecord {
@@ -76,6 +88,11 @@ impl KeptRecord {
         match self.frame {
             KeptFrame::Sensor([x, y, z, ..]) | KeptFrame::World([x, y, z]) => [x, y, z],
         }
+    }
+
+    /// Returns the locations of all that is kept of the scan: its points, and its marks if there are any.
+    pub fn places(&self) -> impl Iterator<Item = SegmentPlace> + use<> {
+        std::iter::once(self.place).chain(self.moving.map(|marks| marks.place))
     }
 }
 
@@ -145,7 +162,11 @@ fn write_kept(scan: &KeptRecord, out: &mut Vec<u8>) {
     out.push(KEPT);
     out.extend(scan.number.to_le_bytes());
     write_stamp(scan.stamp_ns, out);
-    let flags = [(is_in_world, IS_IN_WORLD), (scan.has_intensities, HAS_INTENSITIES)];
+    let flags = [
+        (is_in_world, IS_IN_WORLD),
+        (scan.has_intensities, HAS_INTENSITIES),
+        (scan.moving.is_some(), HAS_MOVING),
+    ];
     out.push(flags.iter().map(|(is_set, flag)| if *is_set { *flag } else { 0 }).sum());
     match &scan.frame {
         KeptFrame::Sensor(pose) => pose.iter().for_each(|x| out.extend(x.to_le_bytes())),
@@ -153,6 +174,9 @@ fn write_kept(scan: &KeptRecord, out: &mut Vec<u8>) {
     }
     let SegmentPlace { segment, offset, bytes } = scan.place;
     [scan.points, scan.updates, segment, offset, bytes].iter().for_each(|n| out.extend(n.to_le_bytes()));
+    if let Some(KeptMarks { marked, place: SegmentPlace { segment, offset, bytes } }) = scan.moving {
+        [marked, segment, offset, bytes].iter().for_each(|n| out.extend(n.to_le_bytes()));
+    }
     let rays = serde_json::to_string(&scan.rays).unwrap_or_default();
     put_number(rays.len() as u64, out);
     out.extend(rays.as_bytes());
@@ -174,6 +198,13 @@ fn read_kept(input: &mut Input<'_>) -> Option<KeptRecord> {
         _ => KeptFrame::World(input.doubles()?),
     };
     let [points, updates, segment, offset, bytes] = input.numbers()?;
+    let moving = match flags & HAS_MOVING {
+        0 => None,
+        _ => {
+            let [marked, segment, offset, bytes] = input.numbers()?;
+            Some(KeptMarks { marked, place: SegmentPlace { segment, offset, bytes } })
+        }
+    };
     let rays_bytes = input.packed_u64()?;
     let rays = serde_json::from_slice(input.take(usize::try_from(rays_bytes).ok()?)?).ok()?;
     let count = input.packed_u64()?;
@@ -197,6 +228,7 @@ fn read_kept(input: &mut Input<'_>) -> Option<KeptRecord> {
         has_intensities: flags & HAS_INTENSITIES != 0,
         updates,
         place: SegmentPlace { segment, offset, bytes },
+        moving,
         tiles,
     })
 }
@@ -272,11 +304,13 @@ mod tests {
             has_intensities: true,
             updates: 99,
             place: SegmentPlace { segment: 3, offset: 1 << 40, bytes: 77 },
+            moving: Some(KeptMarks { marked: 5, place: SegmentPlace { segment: 4, offset: 9, bytes: 8 } }),
             tiles: vec![TileIndex::new(-5, i32::MAX, 0), TileIndex::new(i32::MAX, i32::MIN, 2)],
         };
         let in_world = KeptRecord {
             frame: KeptFrame::World([0.5; 3]),
             has_intensities: false,
+            moving: None,
             stamp_ns: None,
             tiles: vec![],
             ..scan.clone()

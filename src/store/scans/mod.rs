@@ -20,7 +20,7 @@ mod scan_record;
 mod segment;
 
 pub(crate) use catalog::{KeptAsOf, KeptRecords, catalog_generations, whole_fronts};
-pub use catalog_entry::{CatalogEntry, KeptFrame, KeptRecord, SegmentPlace};
+pub use catalog_entry::{CatalogEntry, KeptFrame, KeptMarks, KeptRecord, SegmentPlace};
 pub(crate) use catalog_salvage::{Salvaged, salvage_entries};
 pub use catalog_version::CatalogVersion;
 pub(crate) use needed_scans::{check_segment, kept_as_of};

@@ -70,8 +70,10 @@ impl TileStore {
             files.extend(as_of.generation(disk, layout)?.map(|generation| layout.catalog(generation)));
             let mut records = KeptRecords::open(disk, layout, as_of)?;
             while let Some(scan) = records.next_kept()? {
-                let end = ends.entry(scan.place.segment).or_insert(0);
-                *end = scan.place.offset.saturating_add(scan.place.bytes).max(*end);
+                for place in scan.places() {
+                    let end = ends.entry(place.segment).or_insert(0);
+                    *end = place.offset.saturating_add(place.bytes).max(*end);
+                }
             }
         }
         for (segment, end) in ends {
@@ -139,7 +141,7 @@ impl TileStore {
             generations.extend(as_of.generation(disk, layout)?);
             salvage_entries(disk, layout, as_of, &mut |entry| {
                 if let Salvaged::Whole(CatalogEntry::Kept(scan)) = entry {
-                    needed.insert(scan.place.segment);
+                    needed.extend(scan.places().map(|place| place.segment));
                 }
                 Ok(())
             })?;
@@ -204,7 +206,7 @@ fn unneeded(
         generations.extend(as_of.generation(disk, layout)?);
         let mut records = KeptRecords::open(disk, layout, as_of)?;
         while let Some(scan) = records.next_kept()? {
-            segments.insert(scan.place.segment);
+            segments.extend(scan.places().map(|place| place.segment));
         }
     }
     names.retain(|name| match (Layout::generation_of(name), Layout::segment_of(name)) {

@@ -505,7 +505,8 @@ impl ScanArchive {
         remove_catalogs_after(&self.files, self.last_commit.flush_number)?;
         let (generation, mut records) = (self.generation()?, self.records()?);
         while let Some(scan) = records.next_kept()? {
-            self.highest_segment = self.highest_segment.max(scan.place.segment);
+            let highest = scan.places().map(|place| place.segment).max();
+            self.highest_segment = self.highest_segment.max(highest.unwrap_or_default());
         }
         let extent = generation.and_then(|generation| records.extent(generation));
         let found = extent.map(|(version, has_excess)| Catalog { version, has_excess });
@@ -541,12 +542,11 @@ impl ScanArchive {
         let mut pending = std::mem::take(&mut self.pending);
         let mut moved = Ok(());
         for entry in &mut pending {
-            if let CatalogEntry::Kept(scan) = entry
-                && self.failed_segments.contains(&scan.place.segment)
-            {
-                moved = self.copy(scan.place).map(|place| scan.place = place);
-                if moved.is_err() {
-                    break;
+            let CatalogEntry::Kept(scan) = entry else { continue };
+            let places = [Some(&mut scan.place), scan.moving.as_mut().map(|marks| &mut marks.place)];
+            for place in places.into_iter().flatten() {
+                if moved.is_ok() && self.failed_segments.contains(&place.segment) {
+                    moved = self.copy(*place).map(|copy| *place = copy);
                 }
             }
         }

@@ -1,12 +1,13 @@
 use super::map::{at, map, name, open_or_create, replay, scans};
 use super::model::State;
-use super::scans::{Taken, new_poses};
+use super::scans::{Taken, new_marks, new_poses};
 use std::ops::Range;
 use testkit::faulty_disk::FaultyDisk;
 use voxtile::operations::{
-    NewPoses, OnlineRemap, Remap, ScanSelection, delete_snapshot, remap, remove_points, remove_scans, revert,
-    snapshot,
+    NewPoses, OnlineRemap, Remap, ScanSelection, delete_snapshot, mark_moving, remap, remove_points,
+    remove_scans, revert, snapshot,
 };
+use voxtile::scan::MovingMarks;
 use voxtile::space::TileIndex;
 use voxtile::store::TileStore;
 use voxtile::{Aabb, MapConfig, Mapper, Result};
@@ -26,6 +27,11 @@ pub enum Act {
         seed: u64,
         rest: Option<u64>,
         meanwhile: Range<u64>,
+    },
+    /// Marks points as moving in the scans whose number modulo 4 is `rest`, or in all.
+    Mark {
+        seed: u64,
+        rest: Option<u64>,
     },
     RemoveScans(u64, u64),
     RemovePoints(Aabb),
@@ -65,6 +71,12 @@ pub fn perform(disk: &FaultyDisk, config: &MapConfig, before: &State, act: &Act)
             }
             drop(mapper);
             online.finish().map(drop)
+        }
+        Act::Mark { seed, rest } => {
+            let marks = new_marks(&before.now.scans, *seed, *rest);
+            let numbers: Vec<_> = marks.keys().copied().collect();
+            let of_scan = move |number: u64| Ok(MovingMarks::new(marks[&number].iter().copied()));
+            mark_moving(&scans(disk)?, numbers, of_scan, &replay(), |_, _| ()).map(drop)
         }
         Act::RemoveScans(first, last) => {
             let scans = ScanSelection::Numbers(*first, *last);

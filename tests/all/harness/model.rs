@@ -1,6 +1,6 @@
 use super::acts::{Act, is_removed};
 use super::map::{at, name};
-use super::scans::{Taken, new_poses};
+use super::scans::{Taken, new_marks, new_poses};
 use std::collections::BTreeMap;
 use testkit::faulty_disk::FaultyDisk;
 use testkit::reference_map::{ReferenceMap, Voxels, voxels_of};
@@ -36,7 +36,8 @@ fn kept_scans(reader: &MapReader) -> BTreeMap<u64, Taken> {
             true
         })
         .unwrap();
-        (scan.number(), Taken { points, intensities, pose: scan.world_from_sensor().unwrap() })
+        let is_moving = scan.moving().map_or(vec![false; points.len()], |marks| marks.iter().collect());
+        (scan.number(), Taken { points, intensities, is_moving, pose: scan.world_from_sensor().unwrap() })
     });
     kept.collect()
 }
@@ -73,6 +74,12 @@ impl State {
                 let moved = self.after(&Act::Move { seed: *seed, rest: *rest }, config);
                 return moved.after(&Act::Scans(meanwhile.clone()), config);
             }
+            Act::Mark { seed, rest } => {
+                for (number, is_moving) in new_marks(&now.scans, *seed, *rest) {
+                    now.scans.get_mut(&number).unwrap().is_moving = is_moving;
+                }
+                now.voxels = with_scans(config, Voxels::new(), now.scans.values());
+            }
             Act::RemoveScans(first, last) => {
                 now.scans.retain(|number, _| !(first..=last).contains(&number));
                 now.voxels = with_scans(config, Voxels::new(), now.scans.values());
@@ -87,6 +94,7 @@ impl State {
                         (0..world.points.len()).filter(|&k| !is_inside(world.points[k])).collect();
                     scan.points = kept.iter().map(|&k| scan.points[k]).collect();
                     scan.intensities = kept.iter().map(|&k| scan.intensities[k]).collect();
+                    scan.is_moving = kept.iter().map(|&k| scan.is_moving[k]).collect();
                 }
                 now.voxels = with_scans(config, Voxels::new(), now.scans.values());
             }
@@ -119,6 +127,6 @@ impl State {
 fn with_scans<'a>(config: &MapConfig, before: Voxels, scans: impl IntoIterator<Item = &'a Taken>) -> Voxels {
     let mut map = ReferenceMap::new(config);
     map.voxels = before;
-    scans.into_iter().for_each(|scan| map.insert_scan(&scan.in_world()));
+    scans.into_iter().for_each(|scan| map.insert_marked(&scan.in_world(), &scan.is_moving));
     map.voxels
 }

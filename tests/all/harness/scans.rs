@@ -7,6 +7,8 @@ use voxtile::{Mapper, OutOfCoreTileMapper, Pose, Result, Scan, ScanRef};
 pub struct Taken {
     pub points: Vec<[f64; 3]>,
     pub intensities: Vec<f32>,
+    /// Whether each point is marked as moving.
+    pub is_moving: Vec<bool>,
     pub pose: Pose,
 }
 
@@ -19,7 +21,8 @@ impl Taken {
         points.push([0.0; 3]);
         let mut intensities = scan.intensities.unwrap();
         intensities.push(-0.0);
-        Self { points, intensities, pose: random_pose(&mut random, seed) }
+        let is_moving = vec![false; points.len()];
+        Self { points, intensities, is_moving, pose: random_pose(&mut random, seed) }
     }
 
     pub fn in_world(&self) -> Scan {
@@ -39,7 +42,7 @@ impl PartialEq for Taken {
             let points: Vec<_> = scan.points.iter().map(|point| point.map(f64::to_bits)).collect();
             let intensities: Vec<_> = scan.intensities.iter().map(|value| value.to_bits()).collect();
             let ([x, y, z], [a, b, c, d]) = (scan.pose.position_m(), scan.pose.quaternion());
-            (points, intensities, [x, y, z, a, b, c, d].map(f64::to_bits))
+            (points, intensities, scan.is_moving.clone(), [x, y, z, a, b, c, d].map(f64::to_bits))
         };
         bits(self) == bits(other)
     }
@@ -51,6 +54,17 @@ fn random_pose(random: &mut Random, number: u64) -> Pose {
     let turn = random.between(-3.0, 3.0);
     let position = random.point([along, 0.0, 0.5], 0.3);
     Pose::from_quaternion(position, [0.1, 0.0, (turn / 2.0_f64).sin(), (turn / 2.0_f64).cos()]).unwrap()
+}
+
+/// Returns new marks for the scans whose number modulo 4 is `rest`, or for all. Every fourth has no marked point.
+pub fn new_marks(scans: &BTreeMap<u64, Taken>, seed: u64, rest: Option<u64>) -> BTreeMap<u64, Vec<bool>> {
+    let chosen = scans.iter().filter(|(number, _)| rest.is_none_or(|rest| *number % 4 == rest));
+    let marks = chosen.map(|(&number, scan)| {
+        let mut random = Random(seed ^ number);
+        let share = [0.0, 0.3, 0.5, 1.0][random.below(4) as usize];
+        (number, scan.points.iter().map(|_| random.between(0.0, 1.0) < share).collect())
+    });
+    marks.collect()
 }
 
 /// Returns new poses for the scans whose number modulo 4 is `rest`, or for all.

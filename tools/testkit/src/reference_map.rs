@@ -23,10 +23,16 @@ impl ReferenceMap {
     }
 
     pub fn insert_scan(&mut self, scan: &Scan) {
+        self.insert_marked(scan, &[]);
+    }
+
+    /// Inserts a scan of which some points are marked as moving; no mark means that the point did not move.
+    pub fn insert_marked(&mut self, scan: &Scan, is_moving: &[bool]) {
         let mut once: BTreeMap<VoxelIndex, Observation> = BTreeMap::new();
         for (number, &point) in scan.points.iter().enumerate() {
             let intensity = scan.intensities.as_ref().map_or(0.0, |all| all[number]);
             let Some((misses, end)) = self.ray(scan.origin, point, intensity) else { continue };
+            let end = end.filter(|_| is_moving.get(number) != Some(&true));
             let misses = misses.into_iter().map(|voxel| (voxel, Miss));
             for (voxel, seen) in misses.chain(end.map(|voxel| (voxel, Hit(intensity)))) {
                 if self.config.rays.insert_mode == InsertMode::PerRay {
