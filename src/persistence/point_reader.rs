@@ -71,7 +71,7 @@ pub(crate) fn read_marks(disk: &dyn Disk, layout: &Layout, scan: &KeptRecord) ->
     while let Some(block) = blocks.next_block()? {
         runs.extend_from_slice(block);
     }
-    match MovingMarks::decode(runs, scan.points).filter(|marks| marks.marked() == kept.marked) {
+    match MovingMarks::from_bytes(runs, scan.points).filter(|marks| marks.marked() == kept.marked) {
         Some(marks) => Ok(Some(marks)),
         None => {
             let reason = format!("the marks of moving points of scan {} are invalid", scan.number);

@@ -42,7 +42,7 @@ pub use point_batch::PointBatch;
 pub(crate) use point_batch::updates_of_hits;
 pub use pose::Pose;
 pub(crate) use ray::Advanced;
-pub use ray::{MAX_RAY_STEPS, RayWalk, no_return};
+pub use ray::{MAX_RAY_STEPS, RayWalk, is_hit, no_return};
 pub use report::{ScanReport, SkippedPoints};
 pub use scan_points::{ScanPoints, TakePoints};
 pub use scan_ref::ScanRef;

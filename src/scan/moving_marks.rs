@@ -15,7 +15,7 @@ pub struct MovingMarks {
 impl MovingMarks {
     /// Creates the marks of all points of a scan, in order.
     pub fn new(is_moving: impl IntoIterator<Item = bool>) -> Self {
-        let mut marks = MovingMarksBuilder::default();
+        let mut marks = Self::builder();
         is_moving.into_iter().for_each(|is_moving| marks.push(is_moving));
         marks.finish()
     }
@@ -26,8 +26,22 @@ impl MovingMarks {
         self.marked += if is_marked { length } else { 0 };
     }
 
-    /// Parses the encoded runs of a scan of `points` points; `None` if they are invalid.
-    pub(crate) fn decode(runs: Vec<u8>, points: u64) -> Option<Self> {
+    /// Returns the marks of a scan of which no point is marked.
+    pub fn none(points: u64) -> Self {
+        let mut marks = Self::default();
+        if points > 0 {
+            marks.push_run(points, false);
+        }
+        marks
+    }
+
+    /// Returns a builder that takes the marks point by point.
+    pub fn builder() -> MovingMarksBuilder {
+        MovingMarksBuilder::default()
+    }
+
+    /// Parses the encoded marks of a scan of `points` points; `None` if they are invalid.
+    pub fn from_bytes(runs: Vec<u8>, points: u64) -> Option<Self> {
         let mut marks = Self::default();
         let (mut left, mut is_marked, mut is_first) = (&*runs, false, true);
         while !left.is_empty() {
@@ -43,8 +57,8 @@ impl MovingMarks {
         (marks.points == points).then_some(Self { runs, ..marks })
     }
 
-    /// The encoded runs.
-    pub(crate) fn as_bytes(&self) -> &[u8] {
+    /// The encoded marks.
+    pub fn as_bytes(&self) -> &[u8] {
         &self.runs
     }
 
@@ -179,9 +193,9 @@ mod tests {
             prop_assert_eq!(marks.iter().collect::<Vec<_>>(), all.clone());
             prop_assert_eq!(marks.points(), all.len() as u64);
             prop_assert_eq!(marks.marked(), all.iter().filter(|is| **is).count() as u64);
-            let decoded = MovingMarks::decode(marks.as_bytes().to_vec(), marks.points());
+            let decoded = MovingMarks::from_bytes(marks.as_bytes().to_vec(), marks.points());
             prop_assert_eq!(decoded.as_ref(), Some(&marks));
-            prop_assert_eq!(MovingMarks::decode(marks.as_bytes().to_vec(), marks.points() + 1), None);
+            prop_assert_eq!(MovingMarks::from_bytes(marks.as_bytes().to_vec(), marks.points() + 1), None);
             let mut chunks = ChunkMarks::from(Some(&marks), first);
             let mut found = Vec::new();
             while first + found.len() < all.len() {
@@ -195,7 +209,7 @@ mod tests {
 
         #[test]
         fn damaged_marks_never_panic(bytes in prop::collection::vec(any::<u8>(), 0..40), points in any::<u64>()) {
-            if let Some(marks) = MovingMarks::decode(bytes, points) {
+            if let Some(marks) = MovingMarks::from_bytes(bytes, points) {
                 prop_assert!(marks.marked() <= marks.points());
             }
         }

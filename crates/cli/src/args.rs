@@ -1,6 +1,7 @@
 #[cfg(feature = "bucket")]
 mod bucket;
 mod build;
+mod clean;
 mod edit;
 mod export;
 mod help;
@@ -19,6 +20,7 @@ pub use build::{
 };
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use clap_complete::Shell;
+pub use clean::CleanArgs;
 pub use edit::{ClearArgs, CropArgs, DecayArgs, MergeArgs, PartArgs};
 pub use export::{ExportArgs, WhatName};
 pub use local::{LocalArgs, PresetName};
@@ -114,6 +116,8 @@ pub enum Command {
     RemoveScans(RemoveScansArgs),
     /// Remove all points in a box from the scans that a map keeps and rebuild the affected tiles, in place
     RemovePoints(RemovePointsArgs),
+    /// Mark what moved in the scans that a map keeps, such as cars and walkers, and rebuild the map without it, in place
+    Clean(CleanArgs),
     /// Copy a map to a new map with another storage format and the same content, without its snapshots and kept scans
     Convert(ConvertArgs),
     /// Upload a map to a bucket of an object store; sends only changes since the last push
@@ -180,6 +184,7 @@ impl Command {
             Self::Remap(args) => args.replay.json,
             Self::RemoveScans(args) => args.replay.json,
             Self::RemovePoints(args) => args.replay.json,
+            Self::Clean(args) => args.replay.json,
             #[cfg(feature = "bucket")]
             Self::Push(args) => args.json,
             #[cfg(feature = "bucket")]

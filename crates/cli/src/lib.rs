@@ -4,6 +4,7 @@
 
 mod args;
 mod build;
+mod clean;
 mod clear;
 mod completions;
 mod convert;

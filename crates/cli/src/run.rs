@@ -5,8 +5,8 @@ use super::failure::JsonTo;
 #[cfg(feature = "view")]
 use super::view;
 use super::{
-    build, clear, completions, convert, crop, decay, demo, diff, digest, export, import, info, local, man,
-    merge, one_input, option_names, picture, progress, query, quiet, raycast, remap, remove_points,
+    build, clean, clear, completions, convert, crop, decay, demo, diff, digest, export, import, info, local,
+    man, merge, one_input, option_names, picture, progress, query, quiet, raycast, remap, remove_points,
     remove_scans, repair, report, revert, scans, share, snapshot, snapshots, threads, verify,
 };
 #[cfg(feature = "bucket")]
@@ -80,6 +80,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
         Command::Remap(args) => remap::run(&args),
         Command::RemoveScans(args) => remove_scans::run(&args),
         Command::RemovePoints(args) => remove_points::run(&args),
+        Command::Clean(args) => clean::run(&args),
         #[cfg(feature = "bucket")]
         Command::Push(args) => push::run(&args),
         #[cfg(feature = "bucket")]
@@ -142,7 +143,7 @@ fn plain_number(text: &str) -> Option<String> {
 const fn keeps_to_bytes(command: &Command) -> bool {
     match command {
         Command::Build(args) => args.cache_tiles.is_none(),
-        Command::Remap(_) | Command::RemoveScans(_) | Command::RemovePoints(_) => true,
+        Command::Remap(_) | Command::RemoveScans(_) | Command::RemovePoints(_) | Command::Clean(_) => true,
         _ => false,
     }
 }
@@ -154,6 +155,7 @@ fn is_parallel(command: &Command) -> bool {
         | Command::Remap(_)
         | Command::RemoveScans(_)
         | Command::RemovePoints(_)
+        | Command::Clean(_)
         | Command::Local(_)
         | Command::Demo(_)
         | Command::Export(_)

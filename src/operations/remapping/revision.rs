@@ -315,7 +315,7 @@ impl Revision {
                 match change {
                     Some(Change::Move(pose)) => {
                         scan = scan.with_pose(pose);
-                        record.frame = scan.record().frame.clone();
+                        record.frame = scan.record().frame;
                     }
                     Some(Change::Mark(marks)) => {
                         let marks = marks.of(&scan)?;

@@ -13,8 +13,8 @@ mod slab_path;
 mod slab_ray;
 mod slab_span;
 
-pub use range::no_return;
 pub(crate) use range::{NO_RETURN_M, RangeRule, Ranged};
+pub use range::{is_hit, no_return};
 pub(crate) use ray_cut::RayCut;
 pub(crate) use ray_end::RayEnd;
 pub(crate) use ray_origin::RayOrigin;

@@ -32,6 +32,12 @@ pub fn no_return(origin: Point, direction: Point) -> Option<Point> {
     (length.is_normal() && point.iter().all(|coordinate| coordinate.is_finite())).then_some(point)
 }
 
+/// Returns whether a point is a hit by the range rule: finite, neither too near nor cut at the max range, and not a ray
+/// without return. Both points are in metres, world frame.
+pub fn is_hit(rays: &RayConfig, origin: Point, point: Point) -> bool {
+    matches!(RangeRule::new(rays, origin).apply(point, &mut SkippedPoints::default()), Ranged::Hit(_))
+}
+
 /// Range rule for points seen from one origin.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct RangeRule {

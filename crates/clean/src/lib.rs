@@ -1,0 +1,25 @@
+//! Marks the points of a map's kept scans that hit something that moved, such as a car, a walker or a door.
+//!
+//! ```text
+//! kept scans, map -> voxels that a scan hits and the map calls free      seen_through
+//!                 -> of these, the ones that many scans hit: parked things     stays
+//!                 -> share of such voxels around each point -> marks     neighborhood, find_moving
+//!                 -> marks of all scans, in a temporary file             search, marks_file
+//!                 -> replay of the affected tiles, one commit            clean, undo
+//! ```
+//!
+//! A voxel that a scan hits and that the map calls free was seen through by other scans. A single one is often an error
+//! at the border of a surface. The hits on a moving body are seen through nearly everywhere, so each point is judged by
+//! the voxels around it that the same scan hits.
+
+mod clean;
+mod find_moving;
+mod marks_file;
+mod neighborhood;
+mod search;
+mod seen_through;
+mod stays;
+mod undo;
+
+pub use clean::{Clean, Cleaned, Phase, clean};
+pub use undo::undo;
