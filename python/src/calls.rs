@@ -12,7 +12,7 @@ use serde_json::Value;
 use std::path::PathBuf;
 use std::sync::Arc;
 use voxtile::{Error, Stop};
-use voxtile_pipeline::{Listener, Watch, build, export, export_scans};
+use voxtile_pipeline::{Listener, Watch, WhichPoints, build, export, export_scans};
 
 /// Builds a map. Returns the report that `voxtile build` prints with `--json`, as a dict. With `shard_of`, 32
 /// hexadecimal digits, it builds a shard of the map with this id; the shard is not durable until `move_shard` has moved
@@ -52,14 +52,16 @@ pub fn call_export<'py>(
 /// Exports the scans that a map keeps into a new folder. Returns the report that `voxtile export --scans` prints with
 /// `--json`, as a dict.
 #[pyfunction]
-#[pyo3(signature = (map, folder, progress=None))]
+#[pyo3(signature = (map, folder, only_moving=false, progress=None))]
 pub fn call_export_scans<'py>(
     py: Python<'py>,
     map: PathBuf,
     folder: PathBuf,
+    only_moving: bool,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<Bound<'py, PyAny>> {
-    called(py, progress, move |watch| Ok(serde_json::to_value(export_scans(&map, &folder, watch)?)?))
+    let which = if only_moving { WhichPoints::Moving } else { WhichPoints::All };
+    called(py, progress, move |watch| Ok(serde_json::to_value(export_scans(&map, &folder, which, watch)?)?))
 }
 
 /// Runs `work`. If the callback raises, the work stops as after Ctrl-C.

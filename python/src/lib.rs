@@ -53,7 +53,7 @@ mod _voxtile {
         repair, replace_tiles, revert, snapshots, verify,
     };
     #[pymodule_export]
-    use super::remapping::{remap, remap_as, remove_points, remove_scans};
+    use super::remapping::{clean, remap, remap_as, remove_points, remove_scans};
     #[pymodule_export]
     use super::report::InsertReport;
     #[pymodule_export]

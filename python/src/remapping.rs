@@ -1,4 +1,4 @@
-//! Replays of the scans that a map keeps: new poses, other parameters, removals.
+//! Replays of the scans that a map keeps: new poses, other parameters, removals, marks of what moved.
 
 use crate::config::{clearing_of, memory_of, storage_of};
 use crate::errors::{exception_of_kind, wrong};
@@ -12,6 +12,7 @@ use voxtile::mapper::KeptSummary;
 use voxtile::operations::{self, NewPoses, Remap, Replay, ScanSelection};
 use voxtile::space::Grid;
 use voxtile::{InsertMode, MapView};
+use voxtile_clean::Clean;
 
 /// Returns the options common to all replays.
 fn replay_of(
@@ -177,5 +178,42 @@ pub fn remove_points<'py>(
     reported(py, progress, |stop, progress| {
         let how = how.with_stop(stop.clone());
         operations::remove_points(folder_of(&map)?, &region, &how, |done, all| progress.report(done, all))
+    })
+}
+
+/// Marks the points of kept scans that hit something that moved, and rebuilds the map without these hits. Their rays
+/// stay. Marks nothing outside of `region` (two corners in metres), and nothing that at least `parked_scans` scans hit
+/// in the same place. With `undo`, removes all marks: the map is that of before.
+#[pyfunction]
+#[pyo3(signature = (map, *, undo=false, region=None, parked_scans=None, keep_as=None, dry_run=false, memory=None,
+    progress=None))]
+#[expect(clippy::too_many_arguments, reason = "keywords, in Python")]
+pub fn clean<'py>(
+    py: Python<'py>,
+    map: PathBuf,
+    undo: bool,
+    region: Option<Bound<'py, PyAny>>,
+    parked_scans: Option<u32>,
+    keep_as: Option<&str>,
+    dry_run: bool,
+    memory: Option<Bound<'py, PyAny>>,
+    progress: Callback,
+) -> PyResult<Bound<'py, PyAny>> {
+    if undo && (region.is_some() || parked_scans.is_some()) {
+        return Err(wrong(py, "undo", "removes all marks; pass neither region nor parked_scans"));
+    }
+    if parked_scans == Some(0) {
+        return Err(wrong(py, "parked_scans", "must be at least 1"));
+    }
+    let region = region.as_ref().map(region_of).transpose()?;
+    let how = replay_of(py, keep_as, dry_run, memory.as_ref())?;
+    reported(py, progress, |stop, progress| {
+        let how = how.with_stop(stop.clone());
+        let report = |_: voxtile_clean::Phase, done, all| progress.report(done, all);
+        let options = Clean::new(how.clone()).with_region(region).with_parked_scans(parked_scans);
+        match undo {
+            true => voxtile_clean::undo(folder_of(&map)?, &how, report),
+            false => voxtile_clean::clean(folder_of(&map)?, &options, report),
+        }
     })
 }

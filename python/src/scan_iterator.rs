@@ -14,7 +14,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use voxtile::mapper::{KeptScan, KeptScans, MapReader};
-use voxtile::scan::ScanPoints;
+use voxtile::scan::{MovingMarks, ScanPoints};
 use voxtile::{Pose, Result as Fallible, Stop};
 use voxtile_formats::{ReadOptions, ScanReach, ScanSource, SensorScan};
 use voxtile_pipeline::Watch;
@@ -23,19 +23,25 @@ use voxtile_pipeline::Watch;
 type ReadScan<'py> =
     (Bound<'py, PyArray2<f64>>, Bound<'py, PyArray2<f64>>, Option<Bound<'py, PyArray1<f32>>>);
 
-/// Iterates over scans: `(points, pose, intensities)`, as `Map.insert_many` takes them.
+/// Iterates over scans: `(points, pose, intensities)`, as `Map.insert_many` takes them. `moving` has the marks of the
+/// last one.
 #[pyclass(frozen, module = "voxtile")]
 pub struct ScanIterator {
     reading: Arc<Mutex<Reading>>,
     /// Number of scans left, if known.
     left: AtomicUsize,
+    /// Marks of the scan returned last.
+    moving: Mutex<Option<MovingMarks>>,
 }
 
 struct Reading {
     scans: Scans,
     /// Scan that was read for a call that Ctrl-C interrupted.
-    read: Option<Fallible<Option<SensorScan>>>,
+    read: Option<Fallible<Option<MarkedScan>>>,
 }
+
+/// A scan, and its marks of moving points if it has any.
+type MarkedScan = (SensorScan, Option<MovingMarks>);
 
 /// Source of the scans.
 enum Scans {
@@ -45,10 +51,13 @@ enum Scans {
 }
 
 impl Scans {
-    fn next(&mut self) -> Fallible<Option<SensorScan>> {
+    fn next(&mut self) -> Fallible<Option<MarkedScan>> {
         match self {
-            Self::Input(scans) => scans.next_scan(),
-            Self::Kept(scans, _) => scans.next().map(|scan| in_memory(&scan?)).transpose(),
+            Self::Input(scans) => Ok(scans.next_scan()?.map(|scan| (scan, None))),
+            Self::Kept(scans, _) => {
+                let Some(scan) = scans.next().transpose()? else { return Ok(None) };
+                Ok(Some((in_memory(&scan)?, scan.moving().cloned())))
+            }
         }
     }
 }
@@ -98,15 +107,22 @@ impl ScanIterator {
                 break read;
             }
         };
-        let Some(scan) = read.map_err(|error| exception(py, &error))? else {
+        let Some((scan, moving)) = read.map_err(|error| exception(py, &error))? else {
             self.left.store(0, Ordering::Relaxed);
             return Ok(None);
         };
         // A race between threads makes the hint wrong by one, which is harmless.
         self.left.store(self.left.load(Ordering::Relaxed).saturating_sub(1), Ordering::Relaxed);
+        *self.moving.lock() = moving;
         let SensorScan { points_in_sensor, intensities, world_from_sensor, .. } = scan;
         let pose = rows(py, matrix_of(&world_from_sensor))?;
         Ok(Some((rows(py, points_in_sensor)?, pose, intensities.map(|intensities| column(py, intensities)))))
+    }
+
+    /// Whether each point of the scan returned last is marked as moving (see `voxtile.clean`); `None` if none is.
+    #[getter]
+    fn moving<'py>(&self, py: Python<'py>) -> Option<Bound<'py, PyArray1<bool>>> {
+        self.moving.lock().as_ref().map(|marks| column(py, marks.iter().collect::<Vec<_>>()))
     }
 
     /// Number of scans left, if it is known without reading them; else 0.
@@ -158,6 +174,7 @@ pub fn open_scans(py: Python<'_>, path: PathBuf, options: &Bound<'_, PyDict>) ->
     Ok(ScanIterator {
         reading: Arc::new(Mutex::new(Reading { scans, read: None })),
         left: AtomicUsize::new(count.unwrap_or(0)),
+        moving: Mutex::new(None),
     })
 }
 
@@ -180,7 +197,7 @@ pub fn scan_reaches(
     let asked = stop.clone();
     let reaches = run_detached(py, &stop, move || -> anyhow::Result<Vec<Reach>> {
         let (mut scans, mut reaches) = (input.open()?, Vec::new());
-        while let Some(scan) = scans.next()? {
+        while let Some((scan, _)) = scans.next()? {
             asked.check()?;
             let ScanReach { content, bounds } = ScanReach::of(&scan, max_range, no_return_range);
             let content = content.iter().map(|byte| format!("{byte:02x}")).collect();

@@ -12,7 +12,8 @@ use std::process::ExitCode;
 use voxtile::Error;
 use voxtile_pipeline::output::is_standard_output;
 use voxtile_pipeline::{
-    ExportOptions, ExportSummary, ExportedScans, POSES_NAME, WhichVoxels, Written, export, export_scans,
+    ExportOptions, ExportSummary, ExportedScans, POSES_NAME, WhichPoints, WhichVoxels, Written, export,
+    export_scans,
 };
 
 /// Writes the file and prints a summary, to standard error if the file is standard output. `is_quiet` suppresses the
@@ -20,7 +21,8 @@ use voxtile_pipeline::{
 pub fn run(args: &ExportArgs, is_quiet: bool) -> anyhow::Result<ExitCode> {
     let watch = at_terminal(stop_signal::catch_unfinished()?);
     if let Some(folder) = &args.scans {
-        let exported = export_scans(&args.map, folder, &watch)?;
+        let which = if args.only_moving { WhichPoints::Moving } else { WhichPoints::All };
+        let exported = export_scans(&args.map, folder, which, &watch)?;
         print(args, &exported, &text_of_scans(&exported, folder), &mut summary_out(args.json))?;
         return Ok(ExitCode::SUCCESS);
     }

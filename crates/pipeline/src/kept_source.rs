@@ -83,6 +83,7 @@ impl ScanSource for KeptSource {
             pushed.is_ok()
         })?;
         pushed?;
+        points.set_moving(scan.moving().cloned());
         let (name, stamp_ns) = (scan.number().to_string(), scan.stamp_ns());
         Ok(Some(ScanHead { name, stamp_ns, world_from_sensor }))
     }

@@ -42,7 +42,8 @@ pub use answer::{Answer, answer_at};
 pub use build::build;
 pub use build_options::{BuildOptions, SensorModelKind};
 pub use export::{
-    ExportOptions, ExportSummary, ExportedScans, POSES_NAME, WhichVoxels, Written, export, export_scans,
+    ExportOptions, ExportSummary, ExportedScans, POSES_NAME, WhichPoints, WhichVoxels, Written, export,
+    export_scans,
 };
 pub use flush_schedule::FlushEvery;
 pub use kept_source::is_map;

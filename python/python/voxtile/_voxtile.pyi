@@ -18,6 +18,7 @@ __all__ = [
     "call_build",
     "call_export",
     "call_export_scans",
+    "clean",
     "clear",
     "convert",
     "count_scans",
@@ -219,6 +220,8 @@ class ScanIterator:
     def __iter__(self) -> ScanIterator: ...
     def __next__(self) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float32] | None]: ...
     def __length_hint__(self) -> int: ...
+    @property
+    def moving(self) -> NDArray[np.bool_] | None: ...
 
 def count_scans(path: _Path, options: Mapping[str, Any]) -> int: ...
 def open_scans(path: _Path, options: Mapping[str, Any]) -> ScanIterator: ...
@@ -236,7 +239,9 @@ def call_build(
 def call_export(
     map: _Path, output: _Path, options: Mapping[str, Any], progress: _Progress | None = None
 ) -> dict[str, Any]: ...
-def call_export_scans(map: _Path, folder: _Path, progress: _Progress | None = None) -> dict[str, Any]: ...
+def call_export_scans(
+    map: _Path, folder: _Path, only_moving: bool = False, progress: _Progress | None = None
+) -> dict[str, Any]: ...
 def snapshots(map: _Path) -> list[dict[str, Any]]: ...
 def delete_snapshot(map: _Path, name: str) -> None: ...
 def diff(first: _MapOrSnapshot, second: _MapOrSnapshot, *, progress: _Progress | None = None) -> dict[str, Any]: ...
@@ -248,6 +253,17 @@ def remap(
     poses: Mapping[int, _Pose] | Iterable[_Pose],
     *,
     tolerance: tuple[float, float] | None = None,
+    keep_as: str | None = None,
+    dry_run: bool = False,
+    memory: int | str | None = None,
+    progress: _Progress | None = None,
+) -> dict[str, Any]: ...
+def clean(
+    map: _Path,
+    *,
+    undo: bool = False,
+    region: ArrayLike | None = None,
+    parked_scans: int | None = None,
     keep_as: str | None = None,
     dry_run: bool = False,
     memory: int | str | None = None,

@@ -104,7 +104,8 @@ def scans(path: _Path, **options: Unpack[ReadOptions]) -> ScanIterator:
     """Iterates over the scans of a file or folder, in any format of the command, or over those that a map keeps.
 
     A scan is a tuple of points in the sensor's frame (``float64``, N x 3), the pose (4 x 4) and intensities
-    (``float32``, or ``None``). ``ReadOptions`` lists the keywords.
+    (``float32``, or ``None``). ``ReadOptions`` lists the keywords. After each scan, ``moving`` of the iterator has the
+    marks of its points (see ``voxtile.clean``): ``bool``, or ``None`` if no point is marked.
     """
     return open_scans(path, options)
 
@@ -171,7 +172,15 @@ def export(
 
 
 def export_scans(
-    path: _Path, output: _Path, *, progress: Callable[[int, int], object] | None = None
+    path: _Path,
+    output: _Path,
+    *,
+    only_moving: bool = False,
+    progress: Callable[[int, int], object] | None = None,
 ) -> dict[str, Any]:
-    """Exports the scans that a map keeps into a new folder: a ``.pcd`` file each, and ``poses_tum.txt``."""
-    return call_export_scans(path, output, progress)
+    """Exports the scans that a map keeps into a new folder: a ``.pcd`` file each, and ``poses_tum.txt``.
+
+    If ``voxtile.clean`` has marked points, the files have a field ``moving`` (0 or 1). With ``only_moving``, they have
+    only these points.
+    """
+    return call_export_scans(path, output, only_moving, progress)

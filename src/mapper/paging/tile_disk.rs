@@ -3,7 +3,7 @@ use crate::config::MapConfig;
 use crate::error::{Error, Result};
 use crate::mapper::statistics::{IoCounts, MapStatistics};
 use crate::persistence::{CompactTile, IoThreads, Loaded, Saved, TileSaver, load, new_metadata, upgrade};
-use crate::scan::{MAX_BLOCK_BYTES, MovingMarks, PackedUpdates, PointBlocks, ScanPoints, TileUpdates};
+use crate::scan::{MovingMarks, PackedUpdates, PointBlocks, ScanPoints, TileUpdates};
 use crate::space::{TileIndex, TileTable};
 use crate::store::{
     BegunCommit, CatalogEntry, InputRecord, KeptMarks, Metadata, SegmentPlace, SnapshotName, SpillFile,
@@ -36,6 +36,8 @@ pub(super) struct TileDisk {
 
 /// Approximate bytes of memory per voxel of a tile on disk.
 pub(super) const BYTES_OF_VOXEL: usize = 6;
+/// Maximum bytes of the marks of a scan in one block, below the limit of blocks.
+const MARKS_BLOCK_BYTES: usize = 1 << 20;
 
 impl TileDisk {
     pub(super) fn new(config: &MapConfig, store: TileStore) -> Self {
@@ -311,7 +313,7 @@ impl TileDisk {
         let place = archive.end_scan();
         let mut moving = None;
         if let Some(marks) = scan.moving().filter(|marks| marks.marked() > 0) {
-            let mut blocks = marks.as_bytes().chunks(MAX_BLOCK_BYTES);
+            let mut blocks = marks.as_bytes().chunks(MARKS_BLOCK_BYTES);
             kept = kept.and_then(|()| blocks.try_for_each(|block| archive.push_block(block)));
             // The marks follow the points.
             let end = place.offset + place.bytes;
@@ -341,7 +343,7 @@ impl TileDisk {
         }
         let archive = self.store.archive_mut();
         archive.begin_scan()?;
-        match marks.as_bytes().chunks(MAX_BLOCK_BYTES).try_for_each(|block| archive.push_block(block)) {
+        match marks.as_bytes().chunks(MARKS_BLOCK_BYTES).try_for_each(|block| archive.push_block(block)) {
             Ok(()) => Ok(Some(KeptMarks { marked: marks.marked(), place: archive.end_scan() })),
             Err(error) => {
                 archive.give_up_scan();

@@ -32,7 +32,9 @@ mod octree {
 }
 
 mod scan {
-    pub(crate) use voxtile::scan::{PackedUpdates, PointBlocks, ScanPoints, ScanUpdates, TileUpdates};
+    pub(crate) use voxtile::scan::{
+        MovingMarks, PackedUpdates, PointBlocks, ScanPoints, ScanUpdates, TileUpdates,
+    };
 }
 
 mod sensor {

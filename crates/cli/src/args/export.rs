@@ -22,9 +22,13 @@ pub struct ExportArgs {
         default_value_if("scans", ArgPredicate::IsPresent, "-")
     )]
     pub output: PathBuf,
-    /// Export the kept scans to this folder instead of voxels: one .pcd per scan, and poses_tum.txt
+    /// Export the kept scans to this folder instead of voxels: one .pcd per scan, with a field
+    /// moving (0 or 1) if clean has marked points, and poses_tum.txt
     #[arg(long, value_name = "DIR", conflicts_with_all = ["output", "format", "what", "region", "origin"])]
     pub scans: Option<PathBuf>,
+    /// With --scans: only the points that clean has marked as moving
+    #[arg(long, requires = "scans")]
+    pub only_moving: bool,
     /// Format to write, whatever the extension
     #[arg(long, value_name = "FORMAT", value_parser = format_names())]
     pub format: Option<String>,

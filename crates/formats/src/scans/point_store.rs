@@ -1,7 +1,7 @@
 use std::io;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
-use voxtile::scan::TakePoints;
+use voxtile::scan::{MovingMarks, TakePoints};
 use voxtile::space::Point;
 use voxtile::{Error, Result};
 use voxtile_scratch::{ScratchFile, Window};
@@ -18,6 +18,8 @@ pub struct PointStore {
     filed: usize,
     file: Option<ScratchFile>,
     budget: PointBudget,
+    /// Marks of moving points, if the source has any.
+    moving: Option<Box<MovingMarks>>,
 }
 
 /// Memory limit for the points of a scan, and the folder for the others.
@@ -70,7 +72,17 @@ impl PointStore {
     pub fn begin(&mut self, has_intensities: bool) {
         self.points.clear();
         self.intensities = has_intensities.then(Vec::new);
-        (self.filed, self.file) = (0, None);
+        (self.filed, self.file, self.moving) = (0, None, None);
+    }
+
+    /// Sets the marks of all points, after the last point.
+    pub fn set_moving(&mut self, moving: Option<MovingMarks>) {
+        self.moving = moving.map(Box::new);
+    }
+
+    /// Returns the marks of the points that hit something that was moving, if the source has any.
+    pub fn moving(&self) -> Option<&MovingMarks> {
+        self.moving.as_deref()
     }
 
     pub(crate) fn budget(&self) -> &PointBudget {

@@ -2,7 +2,7 @@ use super::point_store::{PointBudget, PointStore};
 use super::source::{ScanHead, ScanSource};
 use crate::poses::PoseSource;
 use voxtile::Result;
-use voxtile::scan::Pose;
+use voxtile::scan::{MovingMarks, Pose};
 use voxtile::space::Aabb;
 
 /// Selection of scans and points of an input.
@@ -100,10 +100,18 @@ impl SelectedScans {
             let point = to_body.as_ref().map_or(point, |to_body| to_body(point));
             (0..3).all(|k| ignored.min[k] <= point[k] && point[k] <= ignored.max[k])
         };
+        let mut marks = self.unfiltered.moving().map(|moving| (moving.iter(), MovingMarks::builder()));
         let mut outcome = Ok(());
         self.unfiltered.for_each_chunk(0..self.unfiltered.len(), &mut |chunk, intensities| {
             for (number, &point) in chunk.iter().enumerate() {
-                if !is_ignored(point) {
+                let is_taken = !is_ignored(point);
+                if let Some((all, taken)) = &mut marks
+                    && let Some(is_moving) = all.next()
+                    && is_taken
+                {
+                    taken.push(is_moving);
+                }
+                if is_taken {
                     let intensity = intensities.map_or(0.0, |intensities| intensities[number]);
                     outcome = points.push(point, intensity);
                     if outcome.is_err() {
@@ -113,6 +121,7 @@ impl SelectedScans {
             }
             true
         })?;
+        points.set_moving(marks.map(|(_, taken)| taken.finish()));
         self.unfiltered = PointStore::default();
         outcome?;
         Ok(head)

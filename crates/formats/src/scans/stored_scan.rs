@@ -1,7 +1,7 @@
 use super::point_store::PointStore;
 use std::ops::Range;
 use voxtile::Result;
-use voxtile::scan::{Pose, ScanPoints, TakePoints};
+use voxtile::scan::{MovingMarks, Pose, ScanPoints, TakePoints};
 use voxtile::space::Point;
 
 /// Scan of any size in the sensor frame, with the sensor's pose.
@@ -34,6 +34,10 @@ impl ScanPoints for StoredScan {
 
     fn has_intensities(&self) -> bool {
         self.points_in_sensor.has_intensities()
+    }
+
+    fn moving(&self) -> Option<&MovingMarks> {
+        self.points_in_sensor.moving()
     }
 
     fn for_each_chunk(&self, range: Range<usize>, take: &mut TakePoints<'_>) -> Result<()> {

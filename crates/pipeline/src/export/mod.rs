@@ -29,5 +29,5 @@ mod tileset;
 
 pub use options::{ExportOptions, WhichVoxels};
 pub use run::export;
-pub use scans::{ExportedScans, POSES_NAME, export_scans};
+pub use scans::{ExportedScans, POSES_NAME, WhichPoints, export_scans};
 pub use summary::{ExportSummary, Written};

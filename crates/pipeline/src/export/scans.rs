@@ -9,7 +9,7 @@ use std::fs::{self, File};
 use std::io::{self, BufWriter, Write};
 use std::path::Path;
 use voxtile::mapper::KeptScan;
-use voxtile::scan::ScanPoints;
+use voxtile::scan::{MovingMarks, ScanPoints};
 use voxtile::{Error, Result};
 
 /// Summary of exported scans.
@@ -19,6 +19,8 @@ pub struct ExportedScans {
     pub scans: u64,
     /// Number of points of all scans.
     pub points: u64,
+    /// Number of exported points that are marked as moving.
+    pub moving_points: u64,
     /// Whether the points are in the world frame. Readers must be configured accordingly.
     pub world_frame: bool,
 }
@@ -26,17 +28,34 @@ pub struct ExportedScans {
 /// Name of the pose file in TUM format: seconds, position, quaternion.
 pub const POSES_NAME: &str = "poses_tum.txt";
 
-/// Writes the scans that a map keeps into a new folder, atomically.
+/// Points to export.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum WhichPoints {
+    /// All points.
+    #[default]
+    All,
+    /// The points that are marked as moving, of the scans that have any.
+    Moving,
+}
+
+/// Writes the scans that a map keeps into a new folder, atomically. If any point is marked as moving, each file has a
+/// field `moving`, 0 or 1.
 ///
 /// # Errors
 ///
 /// The map cannot be read, it has scans in the world frame and others in the sensor frame, or the folder is not empty
 /// or cannot be written.
-pub fn export_scans(map: &Path, folder: &Path, watch: &Watch) -> anyhow::Result<ExportedScans> {
+pub fn export_scans(
+    map: &Path,
+    folder: &Path,
+    which: WhichPoints,
+    watch: &Watch,
+) -> anyhow::Result<ExportedScans> {
     let reader = MapAt::of(map)?.open()?;
-    let (mut records, mut all, mut are_stamped) = (reader.kept_scans()?, 0, true);
+    let (mut records, mut all, mut are_stamped, mut has_moving) = (reader.kept_scans()?, 0, true, false);
     while let Some(record) = records.next_record()? {
         all += 1;
+        has_moving |= record.moving.is_some();
         are_stamped &= record.stamp_ns.is_some();
     }
     let staged = StagedOutput::beside(folder)?;
@@ -52,6 +71,11 @@ pub fn export_scans(map: &Path, folder: &Path, watch: &Watch) -> anyhow::Result<
     for scan in reader.kept_scans()? {
         watch.stop().check()?;
         let scan = scan?;
+        let moving = scan.moving().map_or(0, MovingMarks::marked);
+        if which == WhichPoints::Moving && moving == 0 {
+            progress.step();
+            continue;
+        }
         let is_in_world = scan.world_from_sensor().is_none();
         if exported.scans > 0 && is_in_world != exported.world_frame {
             let reason = "has scans in the world frame and others in the sensor frame, which cannot be exported to one \
@@ -59,11 +83,12 @@ pub fn export_scans(map: &Path, folder: &Path, watch: &Watch) -> anyhow::Result<
             return Err(Error::argument(map.display().to_string(), reason).into());
         }
         let path = unfinished.join(format!("{:0digits$}.pcd", scan.number()));
-        write_pcd(&scan, &path)?;
+        PcdFile { scan: &scan, which, has_moving }.write(&path)?;
         write_pose(&scan, are_stamped, &mut lines).map_err(|error| Error::io(&poses, "write", error))?;
         exported.world_frame = is_in_world;
         exported.scans += 1;
-        exported.points += scan.len() as u64;
+        exported.points += if which == WhichPoints::Moving { moving } else { scan.len() as u64 };
+        exported.moving_points += moving;
         progress.step();
     }
     lines.flush().map_err(|error| Error::io(&poses, "write", error))?;
@@ -88,41 +113,77 @@ fn decimal_seconds(stamp_ns: i64) -> String {
     format!("{sign}{}.{:09}", all / 1_000_000_000, all % 1_000_000_000)
 }
 
-/// Writes the points as they were inserted: as `float32` if that is exact, else as `float64`.
-fn write_pcd(scan: &KeptScan, path: &Path) -> Result<()> {
-    let mut is_narrow = true;
-    scan.for_each_own_chunk(0..scan.len(), &mut |points, _| {
-        let is_f32 = |x: &f64| f64::from(*x as f32).to_bits() == x.to_bits() || x.is_nan();
-        is_narrow &= points.iter().flatten().all(is_f32);
-        is_narrow
-    })?;
-    let (size, points) = (if is_narrow { 4 } else { 8 }, scan.len());
-    let (field, four, float, one) = match scan.has_intensities() {
-        true => (" intensity", " 4", " F", " 1"),
-        false => ("", "", "", ""),
-    };
-    let header = format!(
-        "# .PCD v0.7 - Point Cloud Data file format\nVERSION 0.7\nFIELDS x y z{field}\nSIZE {size} {size} {size}{four}\n\
-         TYPE F F F{float}\nCOUNT 1 1 1{one}\nWIDTH {points}\nHEIGHT 1\nVIEWPOINT 0 0 0 1 0 0 0\nPOINTS {points}\n\
-         DATA binary\n"
-    );
-    let cannot = |error| Error::io(path, "write", error);
-    let mut out = BufWriter::with_capacity(1 << 18, File::create_new(path).map_err(cannot)?);
-    out.write_all(header.as_bytes()).map_err(cannot)?;
-    let mut written = Ok(());
-    scan.for_each_own_chunk(0..points, &mut |points, intensities| {
-        written = points.iter().enumerate().try_for_each(|(at, point)| {
-            for x in point {
-                match is_narrow {
-                    true => out.write_all(&(*x as f32).to_le_bytes())?,
-                    false => out.write_all(&x.to_le_bytes())?,
+/// A scan as a PCD file.
+struct PcdFile<'a> {
+    scan: &'a KeptScan,
+    which: WhichPoints,
+    /// Whether there is a field of the marks.
+    has_moving: bool,
+}
+
+impl PcdFile<'_> {
+    /// Writes the points as they were inserted: as `float32` if that is exact, else as `float64`.
+    fn write(&self, path: &Path) -> Result<()> {
+        let (scan, is_narrow) = (self.scan, self.is_narrow()?);
+        let cannot = |error| Error::io(path, "write", error);
+        let mut out = BufWriter::with_capacity(1 << 18, File::create_new(path).map_err(cannot)?);
+        out.write_all(self.header(is_narrow).as_bytes()).map_err(cannot)?;
+        let mut marks = scan.moving().map(MovingMarks::iter);
+        let mut written = Ok(());
+        scan.for_each_own_chunk(0..scan.len(), &mut |points, intensities| {
+            written = points.iter().enumerate().try_for_each(|(at, point)| {
+                let is_moving = marks.as_mut().and_then(Iterator::next).unwrap_or(false);
+                if self.which == WhichPoints::Moving && !is_moving {
+                    return Ok(());
                 }
-            }
-            intensities.map_or(Ok(()), |intensities| out.write_all(&intensities[at].to_le_bytes()))
-        });
-        written.is_ok()
-    })?;
-    written.and_then(|()| out.flush()).map_err(cannot)
+                for x in point {
+                    match is_narrow {
+                        true => out.write_all(&(*x as f32).to_le_bytes())?,
+                        false => out.write_all(&x.to_le_bytes())?,
+                    }
+                }
+                if let Some(intensities) = intensities {
+                    out.write_all(&intensities[at].to_le_bytes())?;
+                }
+                if self.has_moving { out.write_all(&[u8::from(is_moving)]) } else { Ok(()) }
+            });
+            written.is_ok()
+        })?;
+        written.and_then(|()| out.flush()).map_err(cannot)
+    }
+
+    fn is_narrow(&self) -> Result<bool> {
+        let mut is_narrow = true;
+        self.scan.for_each_own_chunk(0..self.scan.len(), &mut |points, _| {
+            let is_f32 = |x: &f64| f64::from(*x as f32).to_bits() == x.to_bits() || x.is_nan();
+            is_narrow &= points.iter().flatten().all(is_f32);
+            is_narrow
+        })?;
+        Ok(is_narrow)
+    }
+
+    fn header(&self, is_narrow: bool) -> String {
+        let size = if is_narrow { "4" } else { "8" };
+        // Name, size in bytes and type.
+        let mut fields = vec![("x", size, "F"), ("y", size, "F"), ("z", size, "F")];
+        fields.extend(self.scan.has_intensities().then_some(("intensity", "4", "F")));
+        fields.extend(self.has_moving.then_some(("moving", "1", "U")));
+        let row = |of: fn(&(&'static str, &'static str, &'static str)) -> &'static str| {
+            fields.iter().map(of).collect::<Vec<_>>().join(" ")
+        };
+        let points = match self.which {
+            WhichPoints::All => self.scan.len() as u64,
+            WhichPoints::Moving => self.scan.moving().map_or(0, MovingMarks::marked),
+        };
+        format!(
+            "# .PCD v0.7 - Point Cloud Data file format\nVERSION 0.7\nFIELDS {}\nSIZE {}\nTYPE {}\nCOUNT {}\n\
+             WIDTH {points}\nHEIGHT 1\nVIEWPOINT 0 0 0 1 0 0 0\nPOINTS {points}\nDATA binary\n",
+            row(|field| field.0),
+            row(|field| field.1),
+            row(|field| field.2),
+            row(|_| "1"),
+        )
+    }
 }
 
 #[cfg(test)]
