@@ -1,4 +1,6 @@
-use super::{Random, Solid};
+use super::body::car;
+use super::{Label, Random, Solid};
+use voxtile::space::Point;
 
 /// Distance between the centre lines of two parallel streets in metres: a block and half a street on either side.
 pub(super) const BLOCK_M: f64 = 60.0;
@@ -8,13 +10,55 @@ const CAR_MIDDLE_M: f64 = 5.75;
 const KERB_M: f64 = 7.0;
 const LAMP_M: f64 = 7.6;
 const TREE_M: f64 = 8.6;
-const FRONT_M: f64 = 10.0;
+pub(super) const FRONT_M: f64 = 10.0;
+/// Number of parking spaces on each side of a block.
+const SPACES: i64 = 6;
 
 /// Maximum depth of a house, in metres from the building line.
 const DEEPEST_M: f64 = 15.0;
 
-/// Adds all boxes of one block, given by its index along x and y. No box extends beyond the block.
-pub(super) fn build(seed: u64, block: [i64; 2], solids: &mut Vec<Solid>) {
+/// Returns the indices of the blocks that overlap a square with half an edge of `radius_m` metres around a point. All
+/// boxes of a block are inside it.
+pub(super) fn within(center: Point, radius_m: f64) -> impl Iterator<Item = [i64; 2]> {
+    let range = move |k: usize| {
+        // Casts to i64 saturate at distances at which f64 no longer resolves metres.
+        let block_of = |x: f64| (x / BLOCK_M).floor() as i64;
+        block_of(center[k] - radius_m)..=block_of(center[k] + radius_m)
+    };
+    range(1).flat_map(move |y| range(0).map(move |x| [x, y]))
+}
+
+/// Parking space at the kerb.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Space {
+    /// Index of the block along x and y.
+    pub block: [i64; 2],
+    /// Number of the space in its block.
+    pub number: i64,
+}
+
+/// Front door of a house.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Door {
+    /// Middle of the threshold on the front of the house in metres, world frame.
+    pub at_m: [f64; 2],
+    /// Unit vector from the door to the street.
+    pub outwards: [f64; 2],
+    /// Distance in metres from the middle of the door to either end of the house's front.
+    pub half_front_m: f64,
+}
+
+/// Adds all boxes of one block, given by its index along x and y, and returns the doors of its houses. No box extends
+/// beyond the block.
+///
+/// `parked` returns the label of the car in a parking space, or `None` if the car has left. It is not called for empty
+/// spaces.
+pub(super) fn build(
+    seed: u64,
+    block: [i64; 2],
+    parked: &dyn Fn(Space) -> Option<Label>,
+    solids: &mut Vec<Solid>,
+) -> Vec<Door> {
     let mut random = Random::of(seed, &block);
     let corner_m = block.map(|i| i as f64 * BLOCK_M);
     let is_park = random.chance(0.12);
@@ -22,20 +66,24 @@ pub(super) fn build(seed: u64, block: [i64; 2], solids: &mut Vec<Solid>) {
         side,
         corner_m,
         solids: Vec::new(),
+        doors: Vec::new(),
     });
+    let mut doors = Vec::new();
     let [south, _, west, _] = &mut sides;
     south.add([KERB_M, BLOCK_M - KERB_M], [KERB_M, BLOCK_M - KERB_M], [0.0, 0.15], 0.38);
     if is_park {
         park(&mut random, west);
     }
-    for edge in &mut sides {
+    for (number, edge) in (0..).zip(&mut sides) {
         if !is_park {
             houses(&mut random, edge);
         }
         furniture(&mut random, edge);
-        parked_cars(&mut random, edge);
+        parked_cars(&mut random, edge, &|slot| parked(Space { block, number: SPACES * number + slot }));
         solids.append(&mut edge.solids);
+        doors.append(&mut edge.doors);
     }
+    doors
 }
 
 #[derive(Clone, Copy, PartialEq)]
@@ -51,21 +99,36 @@ struct Edge {
     side: Side,
     corner_m: [f64; 2],
     solids: Vec<Solid>,
+    doors: Vec<Door>,
 }
 
 impl Edge {
     fn add(&mut self, along_m: [f64; 2], off_m: [f64; 2], z_m: [f64; 2], reflectivity: f64) {
         let corner = |i: usize| {
-            let (along, off) = (along_m[i], off_m[i]);
-            let [x, y] = match self.side {
-                Side::South => [along, off],
-                Side::North => [along, BLOCK_M - off],
-                Side::West => [off, along],
-                Side::East => [BLOCK_M - off, along],
-            };
-            [self.corner_m[0] + x, self.corner_m[1] + y, z_m[i]]
+            let [x, y] = self.in_world(along_m[i], off_m[i]);
+            [x, y, z_m[i]]
         };
         self.solids.push(Solid::new(corner(0), corner(1), reflectivity));
+    }
+
+    fn in_world(&self, along_m: f64, off_m: f64) -> [f64; 2] {
+        let [x, y] = match self.side {
+            Side::South => [along_m, off_m],
+            Side::North => [along_m, BLOCK_M - off_m],
+            Side::West => [off_m, along_m],
+            Side::East => [BLOCK_M - off_m, along_m],
+        };
+        [self.corner_m[0] + x, self.corner_m[1] + y]
+    }
+
+    /// Returns the unit vector from the block to the street.
+    fn outwards(&self) -> [f64; 2] {
+        match self.side {
+            Side::South => [0.0, -1.0],
+            Side::North => [0.0, 1.0],
+            Side::West => [-1.0, 0.0],
+            Side::East => [1.0, 0.0],
+        }
     }
 
     /// Adds a box, given by its middle and size along and off the street.
@@ -109,6 +172,11 @@ fn house(random: &mut Random, edge: &mut Edge, along_m: [f64; 2], front_m: f64) 
         edge.add(roof, [front_m + 2.0, back - 2.0], [height, height + random.between(1.0, 3.0)], 0.3);
     }
     let middle = 0.5 * (along_m[0] + along_m[1]);
+    edge.doors.push(Door {
+        at_m: edge.in_world(middle, front_m),
+        outwards: edge.outwards(),
+        half_front_m: 0.5 * (along_m[1] - along_m[0]),
+    });
     // Steps to the door.
     edge.add_at([middle, front_m - 0.3], [1.6, 0.6], [0.15, 0.55], 0.45);
     if random.chance(0.5) {
@@ -154,25 +222,21 @@ fn tree(random: &mut Random, edge: &mut Edge, at_m: [f64; 2]) {
     edge.add_at(at_m, [0.6 * crown; 2], [trunk + crown, trunk + 1.4 * crown], 0.5);
 }
 
-fn parked_cars(random: &mut Random, edge: &mut Edge) {
-    for slot in 0..6 {
+fn parked_cars(random: &mut Random, edge: &mut Edge, parked: &dyn Fn(i64) -> Option<Label>) {
+    for slot in 0..SPACES {
         if !random.chance(0.62) {
             continue;
         }
-        let at = [
-            14.5 + 6.2 * f64::from(slot) + random.between(-0.4, 0.4),
-            CAR_MIDDLE_M + random.between(-0.1, 0.2),
-        ];
+        let at =
+            [14.5 + 6.2 * slot as f64 + random.between(-0.4, 0.4), CAR_MIDDLE_M + random.between(-0.1, 0.2)];
         let paint = random.between(0.15, 0.9);
-        for axle in [-1.4, 1.4] {
-            edge.add_at([at[0] + axle, at[1]], [0.62, 1.7], [0.0, 0.62], 0.1);
+        let is_van = random.chance(0.18);
+        let Some(label) = parked(slot) else { continue };
+        let first = edge.solids.len();
+        for part in car(is_van, paint) {
+            edge.add_at([at[0] + part.ahead_m, at[1]], part.size_m, part.z_m, part.reflectivity);
         }
-        if random.chance(0.18) {
-            edge.add_at(at, [5.0, 1.9], [0.35, 2.25], paint);
-        } else {
-            edge.add_at(at, [4.3, 1.8], [0.3, 0.9], paint);
-            edge.add_at([at[0] - 0.2, at[1]], [2.3, 1.6], [0.9, 1.48], 0.6 * paint);
-        }
+        edge.solids[first..].iter_mut().for_each(|solid| solid.label = label);
     }
 }
 
@@ -199,7 +263,7 @@ mod tests {
         for index in 0..400 {
             let block = [index % 20 - 10, index / 20 - 10];
             let mut solids = Vec::new();
-            build(11, block, &mut solids);
+            build(11, block, &|_| Some(Label::Parked), &mut solids);
             assert!(solids.len() > 20);
             for solid in solids {
                 for (k, &coordinate) in block.iter().enumerate() {

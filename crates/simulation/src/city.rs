@@ -1,5 +1,5 @@
 use super::scene::bounded;
-use super::{Scene, World, block};
+use super::{Label, Scene, World, block};
 use voxtile::space::Point;
 
 /// Unbounded synthetic city: streets on a square grid, houses, parks, parked cars, lamps, trees.
@@ -13,7 +13,7 @@ pub struct City {
 }
 
 /// Asphalt.
-const GROUND_REFLECTIVITY: f64 = 0.22;
+pub(super) const GROUND_REFLECTIVITY: f64 = 0.22;
 
 impl City {
     /// Distance between the centre lines of two parallel streets, in metres.
@@ -29,16 +29,8 @@ impl World for City {
     fn scene(&self, center: Point, radius_m: f64) -> Scene {
         let radius_m = bounded(radius_m);
         let mut solids = Vec::new();
-        // All boxes of a block are inside the block, so only blocks that overlap the requested square matter. Casts to
-        // i64 saturate at distances at which f64 no longer resolves metres.
-        let range = |k: usize| {
-            let block_of = |x: f64| (x / Self::BLOCK_M).floor() as i64;
-            block_of(center[k] - radius_m)..=block_of(center[k] + radius_m)
-        };
-        for y in range(1) {
-            for x in range(0) {
-                block::build(self.seed, [x, y], &mut solids);
-            }
+        for block in block::within(center, radius_m) {
+            block::build(self.seed, block, &|_| Some(Label::Parked), &mut solids);
         }
         Scene::new(solids, GROUND_REFLECTIVITY, center, radius_m)
     }

@@ -1,8 +1,8 @@
-use super::{Hit, Random, World};
+use super::sweep::Sweep;
+use super::{LabelledScan, Sensor, World};
 use std::f64::consts::PI;
 use voxtile::maths;
 use voxtile::scan::{Pose, Scan};
-use voxtile::space::Point;
 
 /// Spinning lidar: beams at fixed elevations, each fired at equal angles over a full turn.
 ///
@@ -81,39 +81,7 @@ impl Lidar {
     /// Points are ordered by angle, with all beams of one angle together. The noise depends on `seed` and
     /// `scan_number`, so two scans from the same pose differ.
     pub fn scan(&self, world: &impl World, world_from_sensor: &Pose, seed: u64, scan_number: u64) -> Scan {
-        let origin = world_from_sensor.position_m();
-        let rotation = world_from_sensor.isometry().rotation.to_rotation_matrix();
-        let r = rotation.matrix();
-        let scene = world.scene(origin, self.max_range_m);
-        let mut noise = Random::of(seed, &[scan_number as i64]);
-        let elevations: Vec<(f64, f64)> = (0..self.beams).map(|beam| self.elevation(beam)).collect();
-        let mut points: Vec<Point> = Vec::new();
-        let mut intensities = Vec::new();
-        for column in 0..self.rays_per_beam {
-            let azimuth_rad = 2.0 * PI * f64::from(column) / f64::from(self.rays_per_beam);
-            let (sin_azimuth, cos_azimuth) = maths::sin_cos(azimuth_rad);
-            for &(up, flat) in &elevations {
-                let d = [flat * cos_azimuth, flat * sin_azimuth, up];
-                let direction =
-                    std::array::from_fn(|i| r[(i, 0)] * d[0] + r[(i, 1)] * d[1] + r[(i, 2)] * d[2]);
-                // Draw the noise also for rays without a hit, so that a ray's noise does not depend on the hits of
-                // other rays.
-                let error_m = self.range_noise_m * noise.bell();
-                match scene.cast(origin, direction, self.max_range_m) {
-                    Some(hit) => {
-                        let measured_m = (hit.distance_m + error_m).max(0.0);
-                        points.push(std::array::from_fn(|k| origin[k] + direction[k] * measured_m));
-                        intensities.push(intensity(&hit));
-                    }
-                    None if self.reports_misses => {
-                        points.push(origin);
-                        intensities.push(0.0);
-                    }
-                    None => {}
-                }
-            }
-        }
-        Scan { origin, points, intensities: Some(intensities) }
+        self.labelled_scan(world, world_from_sensor, seed, scan_number).scan
     }
 
     /// Returns sine and cosine of a beam's elevation.
@@ -124,12 +92,30 @@ impl Lidar {
     }
 }
 
-/// Returns the intensity as an integer from 0 to 255, which decreases with range and grazing angle.
-fn intensity(hit: &Hit) -> f32 {
-    let distance = hit.distance_m / 40.0;
-    let echo = hit.reflectivity * (0.5 + 0.5 * hit.cos_incidence) / (1.0 + distance * distance);
-    // Near and bright surfaces saturate, as in a real lidar.
-    (400.0 * echo + 0.5).floor().clamp(0.0, 255.0) as f32
+impl Sensor for Lidar {
+    fn labelled_scan(
+        &self,
+        world: &impl World,
+        world_from_sensor: &Pose,
+        seed: u64,
+        scan_number: u64,
+    ) -> LabelledScan {
+        let mut sweep = Sweep::new(world, world_from_sensor, self.max_range_m, seed, scan_number);
+        let elevations: Vec<(f64, f64)> = (0..self.beams).map(|beam| self.elevation(beam)).collect();
+        for column in 0..self.rays_per_beam {
+            let azimuth_rad = 2.0 * PI * f64::from(column) / f64::from(self.rays_per_beam);
+            let (sin_azimuth, cos_azimuth) = maths::sin_cos(azimuth_rad);
+            for &(up, flat) in &elevations {
+                let direction = [flat * cos_azimuth, flat * sin_azimuth, up];
+                let measure =
+                    |distance_m: f64, bell: f64| Some((distance_m + self.range_noise_m * bell).max(0.0));
+                if !sweep.fire(direction, self.max_range_m, measure) && self.reports_misses {
+                    sweep.push_miss();
+                }
+            }
+        }
+        sweep.finish()
+    }
 }
 
 #[cfg(test)]
@@ -137,6 +123,7 @@ mod tests {
     use super::super::route::level_pose;
     use super::super::{Building, City};
     use super::*;
+    use voxtile::space::Point;
 
     #[test]
     fn without_noise_every_point_lies_on_a_surface() {

@@ -1,5 +1,5 @@
-use super::Solid;
 use super::solid::{Contact, Ray};
+use super::{Label, Solid};
 use voxtile::space::Point;
 
 /// Part of a world around one position: boxes in a grid of square cells, and the ground plane z = 0.
@@ -26,6 +26,8 @@ pub struct Hit {
     pub reflectivity: f64,
     /// Cosine of the angle between ray and surface normal: 1 head-on, 0 grazing.
     pub cos_incidence: f64,
+    /// Kind of the object; the ground plane is static.
+    pub label: Label,
 }
 
 /// Edge length of a cell in metres: a street ray of 12 m crosses about four, each with a few boxes.
@@ -95,7 +97,8 @@ impl Scene {
     fn ground(&self, ray: &Ray) -> Option<Hit> {
         let distance_m = -ray.origin[2] / ray.direction[2];
         let contact = Contact { distance_m, axis: 2 };
-        (distance_m >= 0.0 && distance_m.is_finite()).then(|| hit(ray, contact, self.ground_reflectivity))
+        (distance_m >= 0.0 && distance_m.is_finite())
+            .then(|| hit(ray, contact, self.ground_reflectivity, Label::Static))
     }
 
     /// Visits cells along the ray until no nearer hit is possible.
@@ -126,7 +129,7 @@ impl Scene {
                     && best.is_none_or(|hit| contact.distance_m < hit.distance_m)
                 {
                     limit_m = limit_m.min(contact.distance_m);
-                    *best = Some(hit(ray, contact, solid.reflectivity));
+                    *best = Some(hit(ray, contact, solid.reflectivity, solid.label));
                 }
             }
             let axis = usize::from(next_m[1] < next_m[0]);
@@ -186,9 +189,9 @@ pub(super) fn bounded(radius_m: f64) -> f64 {
     if radius_m > 0.0 { radius_m.min(Scene::MAX_RADIUS_M) } else { 0.0 }
 }
 
-fn hit(ray: &Ray, contact: Contact, reflectivity: f64) -> Hit {
+fn hit(ray: &Ray, contact: Contact, reflectivity: f64, label: Label) -> Hit {
     let cos_incidence = ray.direction[contact.axis].abs();
-    Hit { distance_m: contact.distance_m, reflectivity, cos_incidence }
+    Hit { distance_m: contact.distance_m, reflectivity, cos_incidence, label }
 }
 
 #[cfg(test)]

@@ -1,3 +1,4 @@
+use super::Label;
 use voxtile::space::{Aabb, Point};
 
 /// Reflecting box; all objects of simulated worlds consist of boxes.
@@ -7,6 +8,8 @@ pub struct Solid {
     pub bounds: Aabb,
     /// Share of reflected light, 0 to 1.
     pub reflectivity: f64,
+    /// Kind of the object that the box is part of.
+    pub label: Label,
 }
 
 /// Ray prepared for tests against many boxes.
@@ -48,9 +51,14 @@ impl Ray {
 }
 
 impl Solid {
-    /// Returns a box between two corners in metres.
+    /// Returns a static box between two corners in metres.
     pub fn new(min: Point, max: Point, reflectivity: f64) -> Self {
-        Self { bounds: Aabb::from_corners(min, max), reflectivity }
+        Self { bounds: Aabb::from_corners(min, max), reflectivity, label: Label::Static }
+    }
+
+    /// Sets the label.
+    pub fn labelled(self, label: Label) -> Self {
+        Self { label, ..self }
     }
 
     /// Returns the nearest intersection with the surface; from inside, the exit point.

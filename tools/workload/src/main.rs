@@ -1,16 +1,18 @@
-//! The command `workload`: writes scans of a synthetic survey to a file or pipe.
+//! The command `workload`: writes scans of a synthetic survey to a file or pipe, or a recording with labels to a
+//! folder.
 
 use anyhow::{Context, Result, bail};
-use clap::Parser;
+use clap::{Args, Parser, Subcommand};
 use std::fs::File;
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use voxtile::Scan;
 use voxtile_formats::ScanStreamWriter;
-use workload::{Length, ScanWriter, SurveyName};
+use workload::{Length, RecordingFolder, ScanWriter, SensorName, SurveyName};
 
-/// Writes the scans of a synthetic survey, as a scan stream that `voxtile build` reads.
+/// Writes the scans of a synthetic survey, as a scan stream that `voxtile build` reads. `workload movers` writes a
+/// recording with moving objects and labels.
 ///
 /// Memory holds one scan at a time, whatever the length of the survey. The same arguments give the same bytes on every
 /// platform.
@@ -18,7 +20,47 @@ use workload::{Length, ScanWriter, SurveyName};
 ///     workload drive --length 5km | voxtile build - -o MAP
 #[derive(Debug, Parser)]
 #[command(name = "workload", version, verbatim_doc_comment)]
+#[command(args_conflicts_with_subcommands = true, subcommand_negates_reqs = true)]
 struct Arguments {
+    #[command(subcommand)]
+    command: Option<Command>,
+    #[command(flatten)]
+    stream: Option<StreamArguments>,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    Movers(MoversArguments),
+}
+
+/// Writes a recording of a city with moving objects, with a label for each point
+///
+/// Ten scans per second. FOLDER/scans/NNNNNN.pcd has x, y, z (metres, sensor frame: x ahead, y left, z up), intensity
+/// (0 to 255) and label: 0 static, 1 parked car, 2 moving object, 3 parked car that leaves during the recording.
+/// FOLDER/poses_kitti.txt has the pose of each scan: sensor to world, 3 x 4 numbers, metres. The same arguments give
+/// the same bytes on every platform.
+///
+///     workload movers --sensor spinning --scans 200 -o FOLDER
+///     voxtile build FOLDER/scans --poses FOLDER/poses_kitti.txt -o MAP
+#[derive(Debug, Args)]
+#[command(verbatim_doc_comment)]
+struct MoversArguments {
+    /// Sensor and its vehicle
+    #[arg(long, value_name = "SENSOR", default_value = "spinning")]
+    sensor: SensorName,
+    /// Number of scans, ten per second
+    #[arg(long, value_name = "N", default_value_t = 200)]
+    scans: usize,
+    /// Seed of the city, the movers and the noise
+    #[arg(long, value_name = "S", default_value_t = 1)]
+    seed: u64,
+    /// Output folder; must be empty or not exist
+    #[arg(short, long, value_name = "FOLDER")]
+    output: PathBuf,
+}
+
+#[derive(Debug, Args)]
+struct StreamArguments {
     /// Survey to generate
     survey: SurveyName,
     /// Number of scans to write
@@ -60,7 +102,25 @@ fn main() -> ExitCode {
 }
 
 fn run(arguments: &Arguments) -> Result<()> {
-    let &Arguments { survey, seed, first, rays, .. } = arguments;
+    match (&arguments.command, &arguments.stream) {
+        (Some(Command::Movers(movers)), _) => write_movers(movers),
+        (None, Some(stream)) => write_survey(stream),
+        (None, None) => bail!("a survey or a command is missing"),
+    }
+}
+
+fn write_movers(arguments: &MoversArguments) -> Result<()> {
+    let &MoversArguments { sensor, scans, seed, .. } = arguments;
+    let mut folder = RecordingFolder::create(&arguments.output)?;
+    let duration_s = scans as f64 / SensorName::RATE_HZ;
+    for scan in sensor.scans(seed, duration_s).take(scans) {
+        folder.write(&scan)?;
+    }
+    folder.finish()
+}
+
+fn write_survey(arguments: &StreamArguments) -> Result<()> {
+    let &StreamArguments { survey, seed, first, rays, .. } = arguments;
     let count = scan_count(arguments)?;
     let out: Box<dyn Write> = match &arguments.output {
         Some(path) => Box::new(created(path)?),
@@ -75,7 +135,7 @@ fn run(arguments: &Arguments) -> Result<()> {
     written.context("cannot write the scans")
 }
 
-fn scan_count(arguments: &Arguments) -> Result<usize> {
+fn scan_count(arguments: &StreamArguments) -> Result<usize> {
     match (arguments.scans, arguments.length, arguments.survey.spacing_m()) {
         (Some(scans), ..) => Ok(scans),
         (None, Some(length), Some(spacing_m)) => Ok((length.metres / spacing_m).ceil() as usize),
