@@ -20,8 +20,9 @@ pub enum Clearing {
 /// - the voxel and its six neighbors are missed, and none of its 26 neighbors is hit;
 /// - the cell of 2 x 2 x 2 voxels that contains it and the six adjacent cells are clear, or the same holds for cells of
 ///   4 x 4 x 4 voxels; a cell is clear if at least one of its voxels is missed and none is hit;
-/// - the cell of 2 x 2 x 2 voxels is clear, none of the 26 cells around it has a hit, and behind it, seen from the
-///   sensor, there is a cell with a hit at a distance of 4 voxels to `approach_voxels`.
+/// - the cell of 2 x 2 x 2 voxels is clear, none of the 26 cells around it has a hit, and the cell below it along z is
+///   clear, too; or behind it, seen from the sensor, there is a cell with a hit at a distance of 4 voxels to
+///   `approach_voxels`.
 ///
 /// "Hit" and "missed" refer to the same scan; a missed voxel is passed by a ray and not hit. Cells are aligned to even
 /// voxel indices, and to multiples of 4. Distances are along the axis on which the cell is farthest from the sensor.
@@ -30,7 +31,7 @@ pub enum Clearing {
 #[non_exhaustive]
 pub struct Guard {
     /// Maximum distance in voxels of a hit cell behind a clear cell: 0 (the condition is not used), 4, 6 or 8.
-    /// Default: 4.
+    /// Default: 6.
     pub approach_voxels: u8,
 }
 
@@ -40,7 +41,7 @@ pub(crate) const GUARD_REACH: i32 = 9;
 
 impl Default for Guard {
     fn default() -> Self {
-        Self { approach_voxels: 4 }
+        Self { approach_voxels: 6 }
     }
 }
 

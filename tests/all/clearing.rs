@@ -40,7 +40,7 @@ fn drive(rays: usize) -> Vec<Scan> {
 
 fn guarded(resolution_m: f64, tile_size_m: f64) -> MapConfig {
     let config = MapConfig::new(resolution_m, tile_size_m).unwrap();
-    config.with_clearing(Clearing::Guarded(Guard::new(6).unwrap()))
+    config.with_clearing(Clearing::Guarded(Guard::new(8).unwrap()))
 }
 
 #[test]
@@ -230,7 +230,7 @@ fn a_map_keeps_its_rule() {
         String::from_utf8(files[&path].clone()).unwrap()
     };
     let metadata: serde_json::Value = serde_json::from_str(&text("map")).unwrap();
-    assert_eq!(metadata["ext"]["rays"]["clearing"]["guarded"]["approach_voxels"], 6);
+    assert_eq!(metadata["ext"]["rays"]["clearing"]["guarded"]["approach_voxels"], 8);
     drop(OutOfCoreTileMapper::create(at("other"), config.clone().with_clearing(Clearing::Octomap)).unwrap());
     assert!(!text("other").contains("clearing"));
     // Programs which do not know the rule refuse the map by its version.

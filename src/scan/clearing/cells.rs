@@ -25,7 +25,7 @@ const fn layers() -> [[u64; 4]; 3] {
 
 /// Returns the items whose lower neighbor along an axis is in the set. `lower` is the block below.
 #[inline]
-fn above<const AXIS: usize>(block: u64, lower: u64) -> u64 {
+pub(super) fn above<const AXIS: usize>(block: u64, lower: u64) -> u64 {
     let [first, second, third, last] = LAYERS[AXIS];
     (block & (first | third)) << (1 << AXIS) | (block & second) << (7 << AXIS) | (lower & last) >> (9 << AXIS)
 }

@@ -1,7 +1,7 @@
 use super::around::{
     Blocks, HERE, Sides, along, is_empty, near_set, neighbors_along_axes, sides_of_voxels, without_near,
 };
-use super::cells::{between_voxels, block_of_octets, cells_of, eroded_block, eroded_octet, octets_of};
+use super::cells::{above, between_voxels, block_of_octets, cells_of, eroded_block, eroded_octet, octets_of};
 use super::marks::{Marks, MarksAround};
 use crate::config::Guard;
 use crate::scan::pages::MarkedBrick;
@@ -93,14 +93,21 @@ impl Clearance {
         }
         let full = cells.eroded(|| neighbors_along_axes(|step| marks.cells(step)));
         let rest = cells.clear & !full;
-        if rest == 0 || self.guard.approach_cells() == 0 || !marks.may_have_hits() {
+        if rest == 0 {
             return full;
         }
-        let approached = self.approached_cells(index, rest, marks);
-        if approached == 0 {
+        let raised = rest & above::<2>(cells.clear, marks.cells(along(2, -1)).clear);
+        if !marks.may_have_hits() {
+            return full | raised;
+        }
+        let mut found = raised;
+        if self.guard.approach_cells() > 0 && rest & !raised != 0 {
+            found |= self.approached_cells(index, rest & !raised, marks);
+        }
+        if found == 0 {
             return full;
         }
-        full | without_near(approached, |step| marks.hit_cells(step))
+        full | without_near(found, |step| marks.hit_cells(step))
     }
 
     /// Returns those of the given cells behind which, seen from the sensor, there is a hit cell. Leaves out most cells

@@ -30,7 +30,7 @@ impl ScanMarks {
                 let cell = voxel.map(|k| k.div_euclid(edge));
                 self.is_clear(cell, edge) && FACES.iter().all(|&face| self.is_clear(sum(cell, face), edge))
             })
-            || self.is_approached(voxel.map(|k| k.div_euclid(2)), guard)
+            || self.is_apart(voxel.map(|k| k.div_euclid(2)), guard)
     }
 
     fn is_open(&self, voxel: VoxelIndex) -> bool {
@@ -48,19 +48,21 @@ impl ScanMarks {
         cube(cell.map(|k| k * edge), edge).any(|voxel| self.hit.contains(&voxel))
     }
 
-    fn is_approached(&self, cell: VoxelIndex, guard: Guard) -> bool {
+    /// Returns whether a cell of 2 voxels is clear and far from hits, and is above a clear cell or in front of a hit.
+    fn is_apart(&self, cell: VoxelIndex, guard: Guard) -> bool {
         // From the center of the sensor's voxel to the center of the cell, in half voxels.
         let way: [i64; 3] = [0, 1, 2].map(|k| 4 * i64::from(cell[k]) + 2 - 2 * i64::from(self.origin[k]) - 1);
         let longest = way.map(i64::abs).into_iter().max().unwrap();
         self.is_clear(cell, 2)
             && cube(sum(cell, [-1; 3]), 3).all(|near| !self.has_hit(near, 2))
-            && (2..=i64::from(guard.approach_voxels) / 2).any(|step| {
-                // The quotient, rounded to the nearest integer, halves away from zero.
-                let offset = way.map(|x| {
-                    let nearest = (2 * step * x.abs() + longest) / (2 * longest);
-                    (nearest * x.signum()) as i32
-                });
-                self.has_hit(sum(cell, offset), 2)
-            })
+            && (self.is_clear(sum(cell, [0, 0, -1]), 2)
+                || (2..=i64::from(guard.approach_voxels) / 2).any(|step| {
+                    // The quotient, rounded to the nearest integer, halves away from zero.
+                    let offset = way.map(|x| {
+                        let nearest = (2 * step * x.abs() + longest) / (2 * longest);
+                        (nearest * x.signum()) as i32
+                    });
+                    self.has_hit(sum(cell, offset), 2)
+                }))
     }
 }

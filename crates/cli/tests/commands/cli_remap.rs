@@ -333,7 +333,7 @@ fn a_map_has_one_rule_of_clearing() {
     let (guarded, again) = (kept.path("guarded"), kept.path("again"));
     let build = ["build", text(&kept.scans), "-o", &guarded, "--keep-scans", "--tile-size", "1"];
     output(&[&build[..], &["--clearing", "guarded"]].concat());
-    assert_eq!(json(&["info", &guarded, "--json"])["clearing"]["guarded"]["approach_voxels"], 4);
+    assert_eq!(json(&["info", &guarded, "--json"])["clearing"]["guarded"]["approach_voxels"], 6);
     assert_eq!(json(&["info", &kept.map, "--json"])["clearing"], "octomap");
     assert!(output(&["info", &guarded]).contains("clearing     guarded"));
     assert_ne!(digest(&guarded), digest(&kept.map));
