@@ -1,13 +1,22 @@
 #!/usr/bin/env python3
 """Measures how well a map keeps surfaces and removes moving objects.
 
-    score.py SET MAP.npz RESOLUTION_M MIN_RANGE_M MAX_RANGE_M
+    score.py SET MAP.npz RESOLUTION_M MIN_RANGE_M MAX_RANGE_M [--by-distance]
 
-SET has scans/*.pcd (binary, with x, y, z and perhaps `label`: 0 static, 1 parked, 2 moving, other: no label), or depth
-images in millimetres (scans/*.png) and camera-intrinsics.txt; and poses_kitti.txt. MAP.npz is the output of `voxtile export MAP -o MAP.npz --what all`. Prints the cells of a table row:
-the share of points in occupied voxels and, with labels, the static accuracy (SA: static points in occupied voxels), the
-dynamic accuracy (DA: moving points not in occupied voxels) and AA = sqrt(SA DA), all in percent. These are the measures
-of Zhang et al., "A Dynamic Points Removal Benchmark in Point Cloud Maps" (2023), for voxels in place of points.
+SET has scans/*.pcd (binary, with x, y, z and perhaps `label`: 0 static, 1 parked, 2 moving, 3 parked car that leaves,
+other: no label), or depth images in millimetres (scans/*.png) and camera-intrinsics.txt; and poses_kitti.txt. MAP.npz
+is the output of `voxtile export MAP -o MAP.npz`. Prints the cells of a table row, all in percent:
+
+- the share of points in occupied voxels,
+- static accuracy SA: static and parked points in occupied voxels,
+- dynamic accuracy DA: moving points not in occupied voxels,
+- AA = sqrt(SA DA),
+- DA of moving points whose voxels contain no static or parked point,
+- points of parked cars that leave in occupied voxels.
+
+SA, DA and AA are the measures of Zhang et al., "A Dynamic Points Removal Benchmark in Point Cloud Maps" (2023), for
+voxels in place of points. With --by-distance, prints a second line of eight cells: SA, then DA, of points at most 10,
+20 and 35 m from the sensor, and beyond.
 """
 import math
 import re
@@ -15,6 +24,30 @@ import sys
 from pathlib import Path
 
 import numpy as np
+
+# Upper ends of the bands of distance from the sensor, in metres.
+BANDS_M = [10, 20, 35, math.inf]
+
+
+class Scans:
+    """Scans of a set whose points are within a range of the sensor. Iterates over points in the world frame, shape
+    (n, 3), distances from the sensor, shape (n,), in metres, and labels, shape (n,), or None."""
+
+    def __init__(self, folder, min_range_m, max_range_m):
+        self.files = sorted(folder.glob("scans/*.p[cn][dg]"), key=natural)
+        intrinsics = folder / "camera-intrinsics.txt"
+        self.camera = np.loadtxt(intrinsics) if intrinsics.exists() else None
+        self.poses = np.loadtxt(folder / "poses_kitti.txt").reshape(-1, 3, 4)
+        self.range_m = min_range_m, max_range_m
+
+    def __iter__(self):
+        for path, pose in zip(self.files, self.poses):
+            xyz, labels = points_of(path) if self.camera is None else (points_of_image(path, self.camera), None)
+            distance_m = np.linalg.norm(xyz, axis=1)
+            used = (distance_m > self.range_m[0]) & (distance_m < self.range_m[1])
+            world = xyz[used] @ pose[:, :3].T + pose[:, 3]
+            yield world, distance_m[used], None if labels is None else labels[used]
+
 
 def natural(path):
     return [int(part) if part.isdigit() else part for part in re.split(r"(\d+)", path.name)]
@@ -50,35 +83,82 @@ def keys_of(points, resolution_m):
     return voxels @ np.array([1 << 42, 1 << 21, 1], dtype=np.int64)
 
 
-def main():
-    folder, map_file = Path(sys.argv[1]), sys.argv[2]
-    resolution_m, min_range_m, max_range_m = map(float, sys.argv[3:])
+def voxels_of(map_file, resolution_m):
+    """Returns the sorted keys of the occupied and of the free voxels in an exported file."""
     with np.load(map_file) as voxels:
         is_occupied = voxels["log_odds"] >= 0
-        occupied = np.sort(keys_of(voxels["xyz"], resolution_m)[is_occupied])
-    scans = sorted(folder.glob("scans/*.p[cn][dg]"), key=natural)
-    intrinsics = folder / "camera-intrinsics.txt"
-    camera = np.loadtxt(intrinsics) if intrinsics.exists() else None
-    poses = np.loadtxt(folder / "poses_kitti.txt").reshape(-1, 3, 4)
-    kept, count = np.zeros(3, np.int64), np.zeros(3, np.int64)  # all, static, moving
-    for path, pose in zip(scans, poses):
-        xyz, labels = points_of(path) if camera is None else (points_of_image(path, camera), None)
-        distance_m = np.linalg.norm(xyz, axis=1)
-        used = (distance_m > min_range_m) & (distance_m < max_range_m)
-        keys = keys_of(xyz[used] @ pose[:, :3].T + pose[:, 3], resolution_m)
-        found = np.searchsorted(occupied, keys).clip(max=len(occupied) - 1)
-        hit = occupied[found] == keys
-        of_label = [np.ones_like(hit)]
+        keys = keys_of(voxels["xyz"], resolution_m)
+    return np.sort(keys[is_occupied]), np.sort(keys[~is_occupied])
+
+
+def contains(sorted_keys, keys):
+    """Returns whether each key is among the sorted ones, shape (n,)."""
+    if not len(sorted_keys):
+        return np.zeros(len(keys), bool)
+    return sorted_keys[np.searchsorted(sorted_keys, keys).clip(max=len(sorted_keys) - 1)] == keys
+
+
+class Tally:
+    """Numbers of points and of kept points by kind and band of distance. Kinds: static or parked, moving, moving in
+    voxels without static points, departing."""
+
+    def __init__(self, static):
+        """`static`: sorted keys of the voxels with static or parked points."""
+        self.static = static
+        self.kept, self.count = np.zeros((2, 4, len(BANDS_M)), np.int64)
+
+    def add(self, keys, is_kept, labels, distance_m):
+        band = np.searchsorted(BANDS_M, distance_m)
+        is_moving = labels == 2
+        is_alone = is_moving.copy()
+        is_alone[is_moving] = ~contains(self.static, keys[is_moving])
+        for kind, chosen in enumerate([labels <= 1, is_moving, is_alone, labels == 3]):
+            self.count[kind] += np.bincount(band[chosen], minlength=len(BANDS_M))
+            self.kept[kind] += np.bincount(band[chosen & is_kept], minlength=len(BANDS_M))
+
+    def cells(self):
+        """Returns SA, DA, AA, DA of voxels without static points, and the share of kept points of departing cars."""
+        count = self.count.sum(1)
+        if not (count[0] and count[1]):
+            return [""] * 5
+        sa, moving, alone, departing = 100 * self.kept.sum(1) / count.clip(min=1)
+        cells = [f"{x:.1f}" for x in [sa, 100 - moving, math.sqrt(sa * (100 - moving)), 100 - alone]]
+        return cells + [f"{departing:.1f}" if count[3] else ""]
+
+    def cells_by_distance(self):
+        """Returns SA of each band and DA of each band."""
+        def shares(kind, invert):
+            pairs = zip(self.kept[kind], self.count[kind])
+            return [f"{100 * (n - kept if invert else kept) / n:.1f}" if n else "" for kept, n in pairs]
+
+        return shares(0, False) + shares(1, True)
+
+
+def keys_of_static_points(scans, resolution_m):
+    """Returns the sorted keys of the voxels with static or parked points."""
+    keys = np.zeros(0, np.int64)
+    for points, _, labels in scans:
         if labels is not None:
-            of_label += [labels[used] <= 1, labels[used] == 2]
-        for number, chosen in enumerate(of_label):
-            kept[number] += np.count_nonzero(hit & chosen)
-            count[number] += np.count_nonzero(chosen)
-    cells = [f"{100 * kept[0] / count[0]:.1f}"]
-    if count[1] and count[2]:
-        sa, da = 100 * kept[1] / count[1], 100 * (1 - kept[2] / count[2])
-        cells += [f"{sa:.1f}", f"{da:.1f}", f"{math.sqrt(sa * da):.1f}"]
-    print(" | ".join((cells + ["", "", ""])[:4]))
+            keys = np.union1d(keys, keys_of(points[labels <= 1], resolution_m))
+    return keys
+
+
+def main():
+    arguments = [argument for argument in sys.argv[1:] if not argument.startswith("--")]
+    folder, map_file = Path(arguments[0]), arguments[1]
+    resolution_m, min_range_m, max_range_m = map(float, arguments[2:])
+    occupied, _ = voxels_of(map_file, resolution_m)
+    scans = Scans(folder, min_range_m, max_range_m)
+    tally, kept, count = Tally(keys_of_static_points(scans, resolution_m)), 0, 0
+    for points, distance_m, labels in scans:
+        keys = keys_of(points, resolution_m)
+        hit = contains(occupied, keys)
+        kept, count = kept + np.count_nonzero(hit), count + len(hit)
+        if labels is not None:
+            tally.add(keys, hit, labels, distance_m)
+    print(" | ".join([f"{100 * kept / max(count, 1):.1f}"] + tally.cells()))
+    if "--by-distance" in sys.argv:
+        print(" | ".join(tally.cells_by_distance()))
 
 
 if __name__ == "__main__":

@@ -36,7 +36,8 @@ enum Command {
 /// Writes a recording of a city with moving objects, with a label for each point
 ///
 /// Ten scans per second. FOLDER/scans/NNNNNN.pcd has x, y, z (metres, sensor frame: x ahead, y left, z up), intensity
-/// (0 to 255) and label: 0 static, 1 parked car, 2 moving object, 3 parked car that leaves during the recording.
+/// (0 to 255) and label: 0 static, 1 parked car, 2 moving object, 3 parked car that leaves. Cars leave in the first
+/// third of the recording, so that the sensor sees the empty places later.
 /// FOLDER/poses_kitti.txt has the pose of each scan: sensor to world, 3 x 4 numbers, metres. The same arguments give
 /// the same bytes on every platform.
 ///
@@ -112,8 +113,8 @@ fn run(arguments: &Arguments) -> Result<()> {
 fn write_movers(arguments: &MoversArguments) -> Result<()> {
     let &MoversArguments { sensor, scans, seed, .. } = arguments;
     let mut folder = RecordingFolder::create(&arguments.output)?;
-    let duration_s = scans as f64 / SensorName::RATE_HZ;
-    for scan in sensor.scans(seed, duration_s).take(scans) {
+    let departures_s = scans as f64 / SensorName::RATE_HZ / 3.0;
+    for scan in sensor.scans(seed, departures_s).take(scans) {
         folder.write(&scan)?;
     }
     folder.finish()
