@@ -17,7 +17,7 @@ list() {
     echo "  endurance  memory, cost of a scan, speed in little memory, over distance: docs/measurements/endurance.md"
     echo "  octocache  the questions of the OctoCache paper: docs/measurements/octocache.md"
     echo "  peers      speed, memory and exactness compared with OctoMap: a table on standard output"
-    echo "  static     surfaces kept and movers removed by both rules of clearing: docs/measurements/clearing.md"
+    echo "  static     surfaces kept and movers removed by both rules of clearing, and DUFOMap: docs/measurements/clearing.md"
     echo "  versions   speed compared with an earlier version (--before COMMIT): docs/measurements/versions.md"
 }
 

@@ -174,5 +174,5 @@ reading the files." \
         "| set | voxel, m | program | points | SA | DA | AA | DA, other | departed | map, s | all, s | peak, MB |" \
         "|---|---:|---|---:|---:|---:|---:|---:|---:|---:|---:|---:|"
 } >"$work/page.md"
-if [[ $mode == --* ]]; then output=/dev/stdout; fi
+if [[ $mode == --short || $mode == --simulated ]]; then output=/dev/stdout; fi
 cat "$work/page.md" >"$output"
