@@ -20,10 +20,10 @@ def main():
     resolution_m, min_range_m, max_range_m = map(float, sys.argv[4:])
     _, free = voxels_of(map_file, resolution_m)
     occupied_there, free_there = voxels_of(other_file, resolution_m)
-    hit = np.zeros(0, np.int64)
+    hit = [np.zeros(0, np.int64)]
     for points, _, _ in Scans(folder, min_range_m, max_range_m):
-        hit = np.union1d(hit, keys_of(points, resolution_m))
-    free = free[~contains(hit, free)]
+        hit.append(np.unique(keys_of(points, resolution_m)))
+    free = free[~contains(np.unique(np.concatenate(hit)), free)]
     shares = [contains(free_there, free), ~(contains(free_there, free) | contains(occupied_there, free))]
     print(" | ".join(f"{100 * np.count_nonzero(share) / max(len(free), 1):.1f}" for share in shares))
 

@@ -136,11 +136,11 @@ class Tally:
 
 def keys_of_static_points(scans, resolution_m):
     """Returns the sorted keys of the voxels with static or parked points."""
-    keys = np.zeros(0, np.int64)
+    keys = [np.zeros(0, np.int64)]
     for points, _, labels in scans:
         if labels is not None:
-            keys = np.union1d(keys, keys_of(points[labels <= 1], resolution_m))
-    return keys
+            keys.append(np.unique(keys_of(points[labels <= 1], resolution_m)))
+    return np.unique(np.concatenate(keys))
 
 
 def main():
