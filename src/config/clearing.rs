@@ -31,7 +31,7 @@ pub enum Clearing {
 #[non_exhaustive]
 pub struct Guard {
     /// Maximum distance in voxels of a hit cell behind a clear cell: 0 (the condition is not used), 4, 6 or 8.
-    /// Default: 6.
+    /// Default: 4.
     pub approach_voxels: u8,
 }
 
@@ -41,7 +41,7 @@ pub(crate) const GUARD_REACH: i32 = 9;
 
 impl Default for Guard {
     fn default() -> Self {
-        Self { approach_voxels: 6 }
+        Self { approach_voxels: 4 }
     }
 }
 

@@ -174,5 +174,5 @@ reading the files." \
         "| set | voxel, m | program | points | SA | DA | AA | DA, other | departed | map, s | all, s | peak, MB |" \
         "|---|---:|---|---:|---:|---:|---:|---:|---:|---:|---:|---:|"
 } >"$work/page.md"
-if [[ $mode == --short || $mode == --simulated ]]; then output=/dev/stdout; fi
-cat "$work/page.md" >"$output"
+# Opening /dev/stdout would truncate a log that it is redirected to.
+if [[ $mode == --short || $mode == --simulated ]]; then cat "$work/page.md"; else cp "$work/page.md" "$output"; fi

@@ -68,7 +68,7 @@ pub enum Phase {
 ///
 /// A voxel that a scan hits was seen through if the map calls it free: other scans, before or after, passed it often
 /// enough. A point is marked if at least two thirds of the voxels around its own that the same scan hits were seen
-/// through, within 0.3 m along each axis, rounded to whole voxels. Things that stood still and left later are marked
+/// through, within 0.35 m along each axis, rounded to whole voxels. Things that stood still and left later are marked
 /// too if their place was seen through afterwards, except with `parked_scans`.
 ///
 /// The result depends on the kept scans alone: earlier marks are removed first, in a commit of their own.

@@ -13,7 +13,7 @@ use voxtile::{Aabb, MapReader, Queries, Result};
 const POINTS_AT_A_TIME: u64 = 1 << 20;
 
 /// Distance of a neighbor in metres along each axis; rounded to whole voxels, at least one.
-const RADIUS_M: f64 = 0.3;
+const RADIUS_M: f64 = 0.35;
 
 /// Finder of the points of kept scans that hit something that moved.
 #[derive(Debug)]

@@ -333,7 +333,7 @@ fn a_map_has_one_rule_of_clearing() {
     let (guarded, again) = (kept.path("guarded"), kept.path("again"));
     let build = ["build", text(&kept.scans), "-o", &guarded, "--keep-scans", "--tile-size", "1"];
     output(&[&build[..], &["--clearing", "guarded"]].concat());
-    assert_eq!(json(&["info", &guarded, "--json"])["clearing"]["guarded"]["approach_voxels"], 6);
+    assert_eq!(json(&["info", &guarded, "--json"])["clearing"]["guarded"]["approach_voxels"], 4);
     assert_eq!(json(&["info", &kept.map, "--json"])["clearing"], "octomap");
     assert!(output(&["info", &guarded]).contains("clearing     guarded"));
     assert_ne!(digest(&guarded), digest(&kept.map));
@@ -351,4 +351,82 @@ fn a_map_has_one_rule_of_clearing() {
     let fresh = kept.path("fresh");
     output(&["build", text(&kept.scans), "-o", &fresh, "--tile-size", "1", "--clearing", "guarded"]);
     assert_eq!(digest(&again), digest(&fresh));
+}
+
+/// Writes six scans of a wall; in the third, something is before the wall. Returns the number of its points.
+fn wall_with_a_passer_by(folder: &Path) -> u64 {
+    fs::create_dir_all(folder.join("scans")).unwrap();
+    let mut passing = 0;
+    for scan in 0..6 {
+        let mut points = String::new();
+        for (row, column) in (-40..=40).flat_map(|row| (-40..=40).map(move |column| (row, column))) {
+            let (y, z) = (f64::from(column) * 0.05, f64::from(row) * 0.05);
+            let is_passing = scan == 2 && y.abs() < 0.8 && z.abs() < 0.8;
+            passing += u64::from(is_passing);
+            let share = if is_passing { 0.5 } else { 1.0 };
+            points += &format!("{} {} {}\n", 5.05 * share, y * share, z * share);
+        }
+        fs::write(folder.join(format!("scans/{scan}.xyz")), points).unwrap();
+    }
+    fs::write(folder.join("poses.txt"), "1 0 0 0 0 1 0 0 0 0 1 0\n".repeat(6)).unwrap();
+    passing
+}
+
+#[test]
+fn what_moved_is_marked_exported_and_unmarked() {
+    let folder = TempDir::new().unwrap();
+    let passing = wall_with_a_passer_by(folder.path());
+    let path = |name: &str| text(&folder.path().join(name)).to_owned();
+    let (scans, poses, map) = (path("scans"), path("poses.txt"), path("map"));
+    output(&[
+        "build",
+        &scans,
+        "--poses",
+        &poses,
+        "-o",
+        &map,
+        "--keep-scans",
+        "--resolution",
+        "0.2",
+        "--clearing",
+        "guarded",
+    ]);
+    let before = digest(&map);
+    let planned = json(&["clean", &map, "--dry-run", "--json"]);
+    let cleaned = json(&["clean", &map, "--keep-as", "before", "--json"]);
+    assert_eq!((&cleaned["scans_changed"], &cleaned["kept_as"]), (&1.into(), &"before".into()));
+    assert_eq!(planned["points_changed"], cleaned["points_changed"]);
+    let marked = cleaned["points_changed"].as_u64().unwrap();
+    assert!(marked > passing * 9 / 10 && marked <= passing, "{marked} of {passing}");
+    assert_ne!(digest(&map), before);
+    let again = output(&["clean", &map]);
+    assert!(again.contains(&format!("moving    {marked} of 39,366 points marked, in 1 scan\n")), "{again}");
+
+    let moving = json(&["export", &map, "--scans", &path("moving"), "--only-moving", "--json"]);
+    assert_eq!((&moving["scans"], &moving["points"]), (&1.into(), &marked.into()));
+    let all = json(&["export", &map, "--scans", &path("all"), "--json"]);
+    assert_eq!(
+        (&all["scans"], &all["points"], &all["moving_points"]),
+        (&6.into(), &39366.into(), &marked.into())
+    );
+    let pcd = fs::read(folder.path().join("all/000003.pcd")).unwrap();
+    let head = "FIELDS x y z moving\nSIZE 8 8 8 1\nTYPE F F F U\nCOUNT 1 1 1 1\nWIDTH 6561\n";
+    assert!(String::from_utf8_lossy(&pcd[..200]).contains(head), "{}", String::from_utf8_lossy(&pcd[..200]));
+    let flags = pcd[pcd.len() - 6561 * 25..].chunks(25).filter(|record| record[24] == 1).count();
+    assert_eq!(flags as u64, marked);
+
+    // A map that is built from this one has the marks, too.
+    let other = path("other");
+    let options = ["--keep-scans", "--resolution", "0.2", "--clearing", "guarded"];
+    output(&[&["build", &map, "-o", &other][..], &options].concat());
+    assert_eq!(digest(&other), digest(&map));
+    let undone = json(&["clean", &map, "--undo", "--json"]);
+    assert_eq!((&undone["points_changed"], &undone["undo"]), (&marked.into(), &true.into()));
+    assert_eq!(digest(&map), before);
+
+    let message = fails(&["clean", &other, "--dry-run"], 2);
+    assert!(message.contains("--dry-run: the map already has marks"), "{message}");
+    fails(&["clean", &other, "--undo", "--parked-scans", "3"], 2);
+    fails(&["clean", &other, "--parked-scans", "0"], 2);
+    assert_eq!(json(&["clean", &other, "--parked-scans", "1", "--json"])["points_changed"], 0);
 }
