@@ -88,3 +88,40 @@ def test_invalid_replays_are_errors(tmp_path: Path) -> None:
         voxtile.remap(tmp_path / "kept", [np.full((4, 4), np.nan)] * 2)
     with pytest.raises(voxtile.VoxtileError):
         list(voxtile.scans(tmp_path / "without"))
+
+
+def wall_with_passer_by(number: int) -> np.ndarray:
+    """Returns the points of a wall; in the third scan something is before it."""
+    y, z = np.meshgrid(np.linspace(-2, 2, 81), np.linspace(-2, 2, 81))
+    points = np.stack([np.full_like(y, 5.05), y, z], axis=-1).reshape(-1, 3)
+    is_before = (np.abs(points[:, 1:]).max(axis=1) < 0.8) & (number == 2)
+    points[is_before] *= 0.5
+    return points
+
+
+def test_what_moved_is_marked_and_unmarked(tmp_path: Path) -> None:
+    path = tmp_path / "map"
+    with voxtile.Map.create(path, resolution=0.2, keep_scans=True, clearing="guarded") as drive:
+        for number in range(6):
+            drive.insert(wall_with_passer_by(number), pose=([0, 0, 0], [0, 0, 0, 1]))
+    before = voxtile.digest(path)
+    report = voxtile.clean(path, memory="256MiB")
+    assert report["scans_changed"] == 1 and report["points"] == 6 * 81 * 81
+    assert voxtile.digest(path) != before
+    scans = voxtile.scans(path)
+    assert scans.moving is None
+    counts = []
+    for points, _, _ in scans:
+        moving = scans.moving
+        counts.append(0 if moving is None else int(moving.sum()))
+        assert moving is None or (moving.dtype == bool and moving.shape == points.shape[:1])
+        assert moving is None or np.all(points[moving, 0] < 3)
+    assert counts == [0, 0, report["points_changed"], 0, 0, 0]
+    exported = voxtile.export_scans(path, tmp_path / "moving", only_moving=True)
+    assert exported["scans"] == 1 and exported["points"] == report["points_changed"]
+    assert voxtile.clean(path, region=[[-9, -9, -9], [0, 9, 9]])["points_changed"] == 0
+    assert voxtile.clean(path, parked_scans=1)["points_changed"] == 0
+    assert voxtile.clean(path, undo=True)["points_changed"] == 0
+    assert voxtile.digest(path) == before
+    with pytest.raises(voxtile.VoxtileError, match="undo"):
+        voxtile.clean(path, undo=True, parked_scans=3)

@@ -67,7 +67,7 @@ pub enum Phase {
 /// where other rays passed them. The points and the misses of their rays stay.
 ///
 /// A voxel that a scan hits was seen through if the map calls it free: other scans, before or after, passed it often
-/// enough. A point is marked if at least two thirds of the voxels around its own that the same scan hits were seen
+/// enough. A point is marked if at least three fifths of the voxels around its own that the same scan hits were seen
 /// through, within 0.35 m along each axis, rounded to whole voxels. Things that stood still and left later are marked
 /// too if their place was seen through afterwards, except with `parked_scans`.
 ///

@@ -66,7 +66,7 @@ impl HitVoxels {
     }
 
     /// Returns the voxels whose neighborhood was seen through: of the hit voxels within `radius` voxels along each axis,
-    /// itself included, at least two thirds.
+    /// itself included, at least three fifths.
     pub(crate) fn moving(&self, radius: i32) -> MovingVoxels {
         let radius = radius.clamp(0, MAX_RADIUS);
         let rows: Vec<_> = self.rows.iter().filter(|(_, row)| row.hit != 0).collect();
@@ -107,7 +107,7 @@ impl HitVoxels {
         }
         let is_moving = |bit: &u32| {
             let (hit, seen_through) = counts[*bit as usize];
-            3 * seen_through >= 2 * hit
+            5 * seen_through >= 3 * hit
         };
         ones(row.hit).filter(is_moving).fold(0, |bits, bit| bits | 1 << bit)
     }
@@ -175,7 +175,7 @@ mod tests {
                     (0..3).all(|k| i64::from(other[k]).abs_diff(i64::from(voxel[k])) <= radius as u64)
                 });
                 let (all, seen) = near.fold((0, 0), |(all, seen), (_, is)| (all + 1, seen + u32::from(*is)));
-                prop_assert_eq!(moving.contains(voxel), 3 * seen >= 2 * all, "{:?}", voxel);
+                prop_assert_eq!(moving.contains(voxel), 5 * seen >= 3 * all, "{:?}", voxel);
             }
         }
     }

@@ -32,6 +32,8 @@ struct Overview {
     scans: u64,
     /// `None` for a map without kept scans.
     points: Option<u64>,
+    /// Number of points that are marked as moving, of a map with kept scans.
+    moving_points: Option<u64>,
     /// Size on disk of the kept scans, in bytes.
     kept_bytes: Option<u64>,
     first_stamp_ns: Option<i64>,
@@ -47,6 +49,8 @@ struct Row {
     name: Option<String>,
     stamp_ns: Option<i64>,
     points: Option<u64>,
+    /// Number of points that are marked as moving, if the map keeps the scan.
+    moving_points: Option<u64>,
     /// Number of tiles that the scan updated, if the map keeps the scan.
     tiles: Option<u64>,
     /// Size on disk in bytes, if the map keeps the scan.
@@ -96,13 +100,16 @@ fn listed(reader: &MapReader, args: &ScansArgs, rows: &mut impl Write) -> anyhow
         reader.scans()?.iter().try_for_each(|scan| overview.add(&Row::of(scan), args, rows))?;
         return Ok(overview);
     }
-    overview.points = Some(0);
+    (overview.points, overview.moving_points) = (Some(0), Some(0));
     let mut scans = reader.kept_scans()?;
     while let Some(scan) = scans.next_record()? {
         let listed = ScanRecord::new(scan.number, scan.stamp_ns, scan.origin_m());
         let (points, tiles) = (Some(scan.points), Some(scan.tiles.len() as u64));
-        let row = Row { points, tiles, kept_bytes: Some(scan.place.bytes), ..Row::of(&listed) };
-        overview.kept_bytes = Some(overview.kept_bytes.unwrap_or_default() + scan.place.bytes);
+        let kept_bytes = scan.places().map(|place| place.bytes).sum();
+        let moving_points = Some(scan.moving.map_or(0, |marks| marks.marked));
+        let row = Row { points, moving_points, tiles, kept_bytes: Some(kept_bytes), ..Row::of(&listed) };
+        overview.kept_bytes = Some(overview.kept_bytes.unwrap_or_default() + kept_bytes);
+        overview.moving_points = overview.moving_points.zip(moving_points).map(|(all, some)| all + some);
         overview.add(&row, args, rows)?;
     }
     let not_kept = (reader.scans()?.len() as u64).saturating_sub(overview.scans);
@@ -131,6 +138,7 @@ fn of_input(args: &ScansArgs, out: &mut impl Write) -> anyhow::Result<Overview> 
             name: Some(scan.name.clone()),
             stamp_ns: scan.stamp_ns,
             points: Some(scan.points_in_sensor.len() as u64),
+            moving_points: None,
             tiles: None,
             kept_bytes: None,
             origin_m: scan.world_from_sensor.position_m(),
@@ -164,6 +172,9 @@ impl Overview {
         writeln!(out, "input     {}: {}", data.display(), self.format)?;
         let points = self.points.map_or(String::new(), |points| format!(", {} points", HumanCount(points)));
         writeln!(out, "scans     {}{points}", HumanCount(self.scans))?;
+        if let Some(moving @ 1..) = self.moving_points {
+            writeln!(out, "moving    {} points are marked (voxtile clean)", HumanCount(moving))?;
+        }
         if let (Some(bytes), Some(points)) = (self.kept_bytes, self.points) {
             let a_point = bytes as f64 / points.max(1) as f64;
             writeln!(out, "kept      {}, {a_point:.2} bytes per point", HumanBytes(bytes))?;
@@ -189,6 +200,7 @@ impl Row {
             name: None,
             stamp_ns: scan.stamp_ns,
             points: None,
+            moving_points: None,
             tiles: None,
             kept_bytes: None,
             origin_m: scan.origin_m,
@@ -201,6 +213,9 @@ impl Row {
         write!(out, "{:>8}  {stamp:>20}  {x:.3} {y:.3} {z:.3}", self.number)?;
         if let Some(points) = self.points {
             write!(out, "  {points} points")?;
+        }
+        if let Some(moving @ 1..) = self.moving_points {
+            write!(out, " ({moving} moving)")?;
         }
         if let Some(tiles) = self.tiles {
             write!(out, "  {tiles} tiles")?;
