@@ -78,6 +78,8 @@ impl TileStore {
             .map_err(|error| Error::io(&log_path, "write", error))?;
         let mut store = Self::new(disk, layout, metadata, Some(log), commits);
         store.committer.begin_writing(lock, false);
+        // A folder with `metadata.json` is a map, and a map without a log is damaged.
+        store.files.sync_map_folder()?;
         store.write_metadata()?;
         Ok(store)
     }

@@ -22,7 +22,10 @@ pub(super) enum NameChange {
     /// Removes a folder and the files that were in it. The files are listed, because another folder may get the same
     /// name before this change reaches the medium.
     RemoveFolder(PathBuf, Vec<Inode>),
-    Rename(PathBuf, PathBuf),
+    /// Renames a file. The file is listed: a file system writes it into the entry of the new name, whatever reached the
+    /// medium of earlier changes of the old name.
+    RenameFile(PathBuf, PathBuf, Inode),
+    RenameFolder(PathBuf, PathBuf),
 }
 
 impl NameChange {
@@ -37,7 +40,7 @@ impl NameChange {
         };
         match self {
             Self::Put(name, _) | Self::Remove(name) | Self::RemoveFolder(name, _) => follow(name),
-            Self::Rename(old, new) => {
+            Self::RenameFile(old, new, _) | Self::RenameFolder(old, new) => {
                 follow(old);
                 follow(new);
             }
@@ -57,7 +60,11 @@ impl NameChange {
                 names.remove(path);
                 names.retain(|name, entry| !is_one_of(name, entry, path, gone));
             }
-            Self::Rename(from, to) => {
+            Self::RenameFile(from, to, inode) => {
+                names.remove(from);
+                names.insert(to.clone(), Entry::File(*inode));
+            }
+            Self::RenameFolder(from, to) => {
                 let moved: Vec<_> = names.keys().filter(|path| path.starts_with(from)).cloned().collect();
                 for path in moved {
                     let entry = names.remove(&path).expect("a name from the list");
@@ -68,9 +75,15 @@ impl NameChange {
         }
     }
 
-    /// Returns whether the change puts one of these files below a folder.
-    pub(super) fn puts_one_of(&self, folder: &Path, files: &[Inode]) -> bool {
-        matches!(self, Self::Put(name, entry) if is_one_of(name, entry, folder, files))
+    /// Returns what is left of the change after these files below a folder were removed with it.
+    pub(super) fn without(self, folder: &Path, files: &[Inode]) -> Option<Self> {
+        match self {
+            Self::Put(name, entry) if is_one_of(&name, &entry, folder, files) => None,
+            Self::RenameFile(from, to, inode) if is_one_of(&to, &Entry::File(inode), folder, files) => {
+                Some(Self::Remove(from))
+            }
+            change => Some(change),
+        }
     }
 }
 

@@ -97,7 +97,9 @@ impl Disk for FaultyDisk {
             NameChange::Put(name, _) | NameChange::Remove(name) | NameChange::RemoveFolder(name, _) => {
                 is_in(name)
             }
-            NameChange::Rename(from, to) => is_in(from) || is_in(to),
+            NameChange::RenameFile(from, to, _) | NameChange::RenameFolder(from, to) => {
+                is_in(from) || is_in(to)
+            }
         };
         let (mut synced, mut unsynced) = (Vec::new(), Vec::new());
         for change in changes {
@@ -106,7 +108,7 @@ impl Disk for FaultyDisk {
                 continue;
             }
             if let NameChange::RemoveFolder(folder, gone) = &change {
-                unsynced.retain(|change| !change.puts_one_of(folder, gone));
+                unsynced = unsynced.into_iter().filter_map(|change| change.without(folder, gone)).collect();
             }
             synced.push(change);
         }
@@ -129,11 +131,16 @@ impl Disk for FaultyDisk {
         if let Some(bytes) = state.unreadable.remove(from) {
             state.unreadable.insert(to.to_owned(), bytes);
         }
-        if entry == Entry::Folder {
-            // Unsynced changes in a folder follow its rename.
-            state.unsynced_names.iter_mut().for_each(|change| change.follow(from, to));
-        }
-        state.change_name(NameChange::Rename(from.to_owned(), to.to_owned()));
+        let (from, to) = (from.to_owned(), to.to_owned());
+        let change = match entry {
+            Entry::File(inode) => NameChange::RenameFile(from, to, inode),
+            Entry::Folder => {
+                // Unsynced changes in a folder follow its rename.
+                state.unsynced_names.iter_mut().for_each(|change| change.follow(&from, &to));
+                NameChange::RenameFolder(from, to)
+            }
+        };
+        state.change_name(change);
         Ok(())
     }
 
@@ -181,12 +188,14 @@ impl Disk for FaultyDisk {
         }
         let on_medium = state.names_on_medium.iter();
         let in_flight = state.unsynced_names.iter().filter_map(|change| match change {
-            NameChange::Put(name, entry) => Some((name, entry)),
+            NameChange::Put(name, entry) => Some((name, *entry)),
+            NameChange::RenameFile(_, name, inode) => Some((name, Entry::File(*inode))),
             _ => None,
         });
+        let on_medium = on_medium.map(|(name, entry)| (name, *entry));
         let in_it = on_medium.chain(in_flight).filter(|(name, _)| name.starts_with(path));
         let files = in_it.filter_map(|(_, entry)| match entry {
-            Entry::File(inode) => Some(*inode),
+            Entry::File(inode) => Some(inode),
             Entry::Folder => None,
         });
         let change = NameChange::RemoveFolder(path.to_owned(), files.collect());
