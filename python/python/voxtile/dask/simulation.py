@@ -16,7 +16,7 @@ from .regions import Box, columns_of, scans_in
 
 @dataclass(frozen=True)
 class Costs:
-    """CPU seconds and bytes. Measured on 120 scans: docs/cluster.md, "The size of regions"."""
+    """CPU seconds and bytes. Measured on 120 scans: docs/cluster.md."""
 
     # First pass: decoding a scan, its box, and its fingerprint.
     plan_scan_s: float = 0.00016
