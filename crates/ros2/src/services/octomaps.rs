@@ -1,6 +1,7 @@
 use crate::live_map::{LiveMap, Moment};
 use crate::messages::{Empty, Octomap, OctomapInBoxRequest, OctomapInBoxResponse, OctomapResponse, Outcome};
 use crate::publishers::{Extent, octomap};
+use anyhow::ensure;
 use voxtile::octree::OctreeFormat;
 use voxtile::{Aabb, Error};
 
@@ -8,9 +9,15 @@ use voxtile::{Aabb, Error};
 const ATTEMPTS: usize = 4;
 
 /// Returns the published octree. On failure it is empty, because the response has no field for an error.
-pub fn around_sensor(map: &LiveMap, extent: &Extent, format: OctreeFormat, _: Empty) -> OctomapResponse {
+pub fn around_sensor(
+    map: &LiveMap,
+    extent: &Extent,
+    format: OctreeFormat,
+    max_bytes: Option<usize>,
+    _: Empty,
+) -> OctomapResponse {
     let moment = map.moment();
-    let made = make(map, &moment, &extent.around(moment.sensor_m), format);
+    let made = make(map, &moment, &extent.around(moment.sensor_m), format, max_bytes);
     let map = made.unwrap_or_else(|error| {
         log::warn!("cannot build a requested octree: {error:#}");
         empty(map, &moment, format)
@@ -18,7 +25,7 @@ pub fn around_sensor(map: &LiveMap, extent: &Extent, format: OctreeFormat, _: Em
     OctomapResponse { map }
 }
 
-pub fn in_box(map: &LiveMap, request: OctomapInBoxRequest) -> OctomapInBoxResponse {
+pub fn in_box(map: &LiveMap, max_bytes: Option<usize>, request: OctomapInBoxRequest) -> OctomapInBoxResponse {
     let OctomapInBoxRequest { min, max, binary } = request;
     let format = if binary { OctreeFormat::Bt } else { OctreeFormat::Ot };
     if !(0..3).all(|k| min[k] < max[k]) {
@@ -27,7 +34,7 @@ pub fn in_box(map: &LiveMap, request: OctomapInBoxRequest) -> OctomapInBoxRespon
         )));
         return OctomapInBoxResponse { outcome, map: Octomap::default() };
     }
-    match make(map, &map.moment(), &Aabb { min, max }, format) {
+    match make(map, &map.moment(), &Aabb { min, max }, format, max_bytes) {
         Ok(map) => OctomapInBoxResponse { outcome: Outcome::from(Ok(String::new())), map },
         Err(error) => {
             let outcome = Outcome::from(Err(format!("{error:#}")));
@@ -42,7 +49,16 @@ fn empty(map: &LiveMap, moment: &Moment, format: OctreeFormat) -> Octomap {
     Octomap { header: map.header(moment), binary, id: "OcTree".to_owned(), resolution, data: Vec::new() }
 }
 
-fn make(map: &LiveMap, moment: &Moment, region: &Aabb, format: OctreeFormat) -> anyhow::Result<Octomap> {
+/// Bytes of a response besides the octree and the name of the frame, rounded up.
+const OTHER_BYTES: usize = 96;
+
+fn make(
+    map: &LiveMap,
+    moment: &Moment,
+    region: &Aabb,
+    format: OctreeFormat,
+    max_bytes: Option<usize>,
+) -> anyhow::Result<Octomap> {
     let attempt = || octomap(&map.view(), region, format, map.header(moment));
     let mut made = attempt();
     for _ in 1..ATTEMPTS {
@@ -52,7 +68,15 @@ fn make(map: &LiveMap, moment: &Moment, region: &Aabb, format: OctreeFormat) -> 
         }
         made = attempt();
     }
-    made
+    let made = made?;
+    let bytes = made.data.len() + made.header.frame_id.len() + OTHER_BYTES;
+    ensure!(
+        max_bytes.is_none_or(|most| bytes <= most),
+        "the response has {bytes} bytes, and at most {} arrive over Fast DDS; subscribe to the topic of the octree, \
+         request a smaller box, or use Zenoh or Cyclone DDS",
+        max_bytes.unwrap_or_default(),
+    );
+    Ok(made)
 }
 
 #[cfg(test)]
@@ -72,12 +96,30 @@ mod tests {
         let map = LiveMap::new("map".to_owned(), mapper.reader().unwrap(), origin, 7);
         let extent = Extent { radius_m: 5.0, heights_m: [f64::NEG_INFINITY, f64::INFINITY] };
         for (format, binary) in [(OctreeFormat::Bt, true), (OctreeFormat::Ot, false)] {
-            let made = around_sensor(&map, &extent, format, Empty::default()).map;
+            let made = around_sensor(&map, &extent, format, None, Empty::default()).map;
             assert_eq!(
                 (made.binary, &*made.id, made.resolution, made.data.len()),
                 (binary, "OcTree", 0.1, 0)
             );
             assert_eq!((&*made.header.frame_id, made.header.stamp.nanosec), ("map", 7));
         }
+    }
+
+    #[test]
+    fn a_response_that_would_not_arrive_is_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        let config = MapConfig::new(0.1, 10.0).unwrap();
+        let mut mapper = OutOfCoreTileMapper::create(folder.path().join("map"), config).unwrap();
+        let points = (0..100).map(|k| [5.05, 0.05 * f64::from(k), 1.05]).collect();
+        mapper.insert_scan(&Scan { origin: [0.05; 3], points, intensities: None }).unwrap();
+        let map = LiveMap::new("map".to_owned(), mapper.reader().unwrap(), [0.05; 3], 7);
+        let request = || OctomapInBoxRequest { min: [0.0; 3], max: [9.0; 3], binary: true };
+        let whole = in_box(&map, None, request());
+        assert!(whole.outcome.success, "{whole:?}");
+        let bytes = whole.map.data.len() + "map".len() + OTHER_BYTES;
+        assert_eq!(in_box(&map, Some(bytes), request()).map.data, whole.map.data);
+        let refused = in_box(&map, Some(bytes - 1), request());
+        assert!(!refused.outcome.success && refused.map.data.is_empty());
+        assert!(refused.outcome.message.contains(&format!("at most {} arrive", bytes - 1)), "{refused:?}");
     }
 }

@@ -19,18 +19,18 @@ pub fn start(
     orders: &Orders,
 ) -> anyhow::Result<()> {
     change_the_map(transport, orders)?;
-    let extent = args.extent()?;
+    let (extent, max_bytes) = (args.extent()?, transport.max_response_bytes());
     for (name, format) in [("octomap_binary", OctreeFormat::Bt), ("octomap_full", OctreeFormat::Ot)] {
         let map = map.clone();
         transport.serve(name, TypeName::new("octomap_msgs", "GetOctomap"), move |request| {
-            octomaps::around_sensor(&map, &extent, format, request)
+            octomaps::around_sensor(&map, &extent, format, max_bytes, request)
         })?;
     }
     let live = map.clone();
     transport.serve(
         "~/octomap_in_box",
         TypeName::new("voxtile_msgs", "GetOctomapInBox"),
-        move |request| octomaps::in_box(&live, request),
+        move |request| octomaps::in_box(&live, max_bytes, request),
     )?;
     let live = map.clone();
     transport.serve("~/cast_ray", TypeName::new("voxtile_msgs", "CastRay"), move |request| {

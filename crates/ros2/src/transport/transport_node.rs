@@ -86,6 +86,15 @@ impl Transport {
         }
     }
 
+    /// Maximum size of a response of a service in bytes, if there is one.
+    pub fn max_response_bytes(&self) -> Option<usize> {
+        match self {
+            Self::Dds(node) => node.max_response_bytes(),
+            #[cfg(feature = "zenoh")]
+            Self::Zenoh(_) => None,
+        }
+    }
+
     pub fn leave(self) {
         match self {
             Self::Dds(_) => {}

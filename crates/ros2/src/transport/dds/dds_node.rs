@@ -26,6 +26,8 @@ pub struct DdsNode {
     node: Arc<Mutex<Node>>,
     names: Names,
     rmw: Rmw,
+    /// Whether peers on other hosts are served.
+    network: bool,
     inbox: Arc<Inbox>,
     /// Keeps the node in the graph.
     _context: Context,
@@ -67,9 +69,21 @@ impl DdsNode {
             node,
             names,
             rmw: args.rmw,
+            network: args.network,
             inbox: inbox.clone(),
             _context: context,
         })
+    }
+
+    /// Maximum size of a response in bytes for clients of Fast DDS; `None` for Cyclone DDS.
+    ///
+    /// `rustdds` 0.15 splits responses that do not fit into a datagram, and writes one byte too many in front of the
+    /// request's identity in each part (`DataFrag::write_to`), so that clients discard them. Clients of Cyclone DDS find
+    /// the identity in the message itself.
+    pub fn max_response_bytes(&self) -> Option<usize> {
+        // UDP over loopback, and a frame of Ethernet, without headers.
+        let datagram = if self.network { 1300 } else { 64_000 };
+        (self.rmw == Rmw::Fastrtps).then_some(datagram)
     }
 
     pub fn subscribe(&self, topic: &str, kind: TypeName, qos: Qos, put: Put) -> anyhow::Result<()> {
