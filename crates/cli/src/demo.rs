@@ -121,6 +121,11 @@ fn print_next_steps(folder: &Path, map: &Path, picture: &Path, [x, y, z]: Point)
     let (folder, map) = (folder.display(), map.display());
     writeln!(out, "picture   {}", picture.display())?;
     writeln!(out, "\nNext steps:")?;
+    if cfg!(feature = "view") {
+        writeln!(out, "  voxtile view {map}")?;
+    }
+    writeln!(out, "  voxtile picture {map} -o {folder}/slice.png --slice 1.5")?;
+    writeln!(out, "  voxtile report {map} -o {folder}/report.html")?;
     writeln!(out, "  voxtile info {map}")?;
     writeln!(out, "  voxtile query {map} {x:.1} {y:.1} {z:.1}")?;
     writeln!(out, "  voxtile raycast {map} --origin {x:.1} {y:.1} {z:.1} --direction 0 1 0")?;

@@ -52,38 +52,53 @@ fn programs() -> Option<PathBuf> {
     None
 }
 
-#[test]
-fn the_tutorial_runs_from_top_to_bottom() {
-    let Some(programs) = programs() else { return };
-    let tutorial = page("docs/tutorial.md");
+/// Runs the shell blocks of a page in one script, in a temporary folder, which it returns.
+fn run_blocks(path: &str, programs: &Path, is_run: impl Fn(&Block) -> bool) -> tempfile::TempDir {
     let mut script = String::new();
-    for Block { line, language, text, skipped } in blocks(&tutorial) {
+    for block in blocks(&page(path)).iter().filter(|block| is_run(block)) {
+        let Block { line, language, text, skipped } = block;
         match skipped {
             None if language == "sh" => script += &format!("at={line}\n{text}"),
             reason => {
-                let reason = reason.unwrap_or(format!("a block of {language}"));
-                println!("docs/tutorial.md:{line}: skipped: {reason}");
+                let reason = reason.clone().unwrap_or(format!("a block of {language}"));
+                println!("{path}:{line}: skipped: {reason}");
             }
         }
     }
-    assert!(script.contains("voxtile build") && script.contains("voxtile revert"), "{script}");
+    assert!(script.contains("voxtile export"), "{script}");
 
     let folder = tempfile::tempdir().unwrap();
-    let path = format!("{}:{}", programs.display(), std::env::var("PATH").unwrap());
+    let programs = format!("{}:{}", programs.display(), std::env::var("PATH").unwrap());
     // The script ends at the first error, also on the left of a pipe. A timeout ends commands that are repeated until
     // they succeed.
-    let head = "trap 'echo \"docs/tutorial.md: the block at line $at fails: $BASH_COMMAND\" >&2' ERR\n";
+    let head = format!("trap 'echo \"{path}: the block at line $at fails: $BASH_COMMAND\" >&2' ERR\n");
     let run = Command::new("timeout")
         .args(["600", "bash", "-Eeuo", "pipefail", "-c", &format!("{head}{script}")])
         .current_dir(folder.path())
-        .env("PATH", path)
+        .env("PATH", programs)
         .output()
         .unwrap();
     let errors = String::from_utf8_lossy(&run.stderr);
     assert!(run.status.success(), "{}: {errors}", run.status);
+    folder
+}
+
+#[test]
+fn the_tutorial_runs_from_top_to_bottom() {
+    let Some(programs) = programs() else { return };
+    let folder = run_blocks("docs/tutorial.md", &programs, |_| true);
     // The files that exist afterwards according to the page.
     for file in ["voxtile_demo/map.png", "walls.ply", "city.bt", "moved.bt.origin.json"] {
         assert!(folder.path().join("tutorial").join(file).is_file(), "{file}");
+    }
+}
+
+#[test]
+fn the_readmes_commands_run_in_the_printed_order() {
+    let Some(programs) = programs() else { return };
+    let folder = run_blocks("README.md", &programs, |block| block.text.starts_with("voxtile "));
+    for file in ["voxtile_demo/map.png", "slice.png", "report.html", "occupied.ply"] {
+        assert!(folder.path().join(file).is_file(), "{file}");
     }
 }
 
