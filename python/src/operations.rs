@@ -11,6 +11,7 @@ use std::path::{Path, PathBuf};
 use voxtile::integrity::VerifyScope;
 use voxtile::mapper::{MapReader, MapView, OctreeMap};
 use voxtile::operations::{self, Decay, Part, Prefer};
+use voxtile::space::Grid;
 use voxtile::{MapPath, MemoryLimit, Result, SnapshotName, Stop, TileIndex, integrity};
 use voxtile_pipeline::{check_is_no_file, octree_file};
 
@@ -199,6 +200,15 @@ pub fn replace_tiles<'py>(
             .collect::<Result<Vec<_>>>()?;
         operations::replace_tiles(&map, &parts, of_flush, scans, |done, all| progress.report(done, all))
     })
+}
+
+/// Returns the tile size in metres that a new map of a resolution in metres has by default.
+#[pyfunction]
+pub fn default_tile_size(py: Python<'_>, resolution: f64) -> PyResult<f64> {
+    match Grid::with_resolution(resolution) {
+        Ok(grid) => Ok(grid.tile_size_m()),
+        Err(error) => Err(exception(py, &error.into())),
+    }
 }
 
 /// Describes a map: id, flush and scan numbers, number of records in its list of scans (`None` if unknown), grid and

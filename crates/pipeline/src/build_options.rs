@@ -27,7 +27,8 @@ pub struct BuildOptions {
     pub output: PathBuf,
     /// Edge of a voxel in metres. Default: 0.1.
     pub resolution_m: Option<f64>,
-    /// Edge of a tile in metres. Default: 10.
+    /// Edge of a tile in metres. Default: the multiple of the resolution nearest to 10, as
+    /// [`Grid::with_resolution`](voxtile::space::Grid::with_resolution) describes.
     pub tile_size_m: Option<f64>,
     /// Storage format of tiles. Default: OctoMap's.
     pub storage: Option<Storage>,

@@ -1,5 +1,6 @@
 use crate::memory;
-use serde::Serialize;
+use serde::ser::SerializeMap;
+use serde::{Serialize, Serializer};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 use voxtile::OctreeConfig;
@@ -34,8 +35,8 @@ pub struct Summary {
     pub left_out: u64,
     /// Further remarks for the user.
     pub remarks: Vec<String>,
-    /// Grid of voxels and tiles.
-    #[serde(skip)]
+    /// Grid of voxels and tiles; serialized as `resolution_m` and `tile_size_m`.
+    #[serde(flatten, serialize_with = "lengths")]
     pub grid: Grid,
     /// Statistics of points and rays.
     #[serde(flatten)]
@@ -71,6 +72,13 @@ pub struct Summary {
     pub seconds: f64,
     /// Peak resident memory of the process.
     pub peak_rss_bytes: Option<u64>,
+}
+
+fn lengths<S: Serializer>(grid: &Grid, serializer: S) -> Result<S::Ok, S::Error> {
+    let mut lengths = serializer.serialize_map(Some(2))?;
+    lengths.serialize_entry("resolution_m", &grid.resolution_m())?;
+    lengths.serialize_entry("tile_size_m", &grid.tile_size_m())?;
+    lengths.end()
 }
 
 /// Statistics of pointer octrees, from the start to the last flush.

@@ -120,7 +120,7 @@ class Map:
         path: _Path,
         resolution: float = 0.1,
         *,
-        tile_size: float = 10.0,
+        tile_size: float | None = None,
         min_range: float = 0.0,
         max_range: float | None = None,
         insert_mode: _InsertMode = "per-scan",
@@ -319,6 +319,7 @@ def join(shards: Sequence[_Path], output: _Path, *, progress: _Progress | None =
 def replace_tiles(
     map: _Path, parts: Sequence[_Path], *, of_flush: int, scans: int, progress: _Progress | None = None
 ) -> dict[str, Any]: ...
+def default_tile_size(resolution: float) -> float: ...
 def describe(map: _MapOrSnapshot) -> dict[str, Any]: ...
 def crop(
     map: _MapOrSnapshot,
