@@ -1,6 +1,6 @@
 use crate::build_options::{BuildOptions, SensorModelKind};
 use crate::region_tiles::tiles_of;
-use crate::scan_input::name_of_path;
+use crate::scan_input::ScanInput;
 use voxtile::mapper::{MapReader, MapView};
 use voxtile::sensor::{Iwlo, LogOdds, SensorModel};
 use voxtile::space::GridError;
@@ -24,21 +24,21 @@ pub fn config_to_create(options: &BuildOptions) -> anyhow::Result<MapConfig> {
 }
 
 /// Returns the parameters of an existing map. Given options must agree with them.
-pub fn config_to_go_on(options: &BuildOptions) -> anyhow::Result<MapConfig> {
+pub fn config_to_go_on(options: &BuildOptions, input: &ScanInput) -> anyhow::Result<MapConfig> {
     let map = MapReader::open(&options.output, 0)?;
     let mut config = map.config().clone();
     let grid = config.grid.replaced(options.resolution_m, options.tile_size_m);
     config.grid = grid.map_err(|error| name_the_option(error.into()))?;
     check_storage(options, config.storage)?;
     check_threshold(options, config.occupancy_threshold)?;
-    let begun = options.resume.then(|| rays_begun(options, &map));
+    let begun = options.resume.then(|| rays_begun(input, &map));
     Ok(for_this_run(options, config, begun)?.validated()?)
 }
 
 /// Returns the ray settings of the input to resume. A later input may have changed the map's current ones. Whether it
 /// is the same input is only known once it is read; its settings are compared then.
-fn rays_begun(options: &BuildOptions, map: &MapReader) -> RayConfig {
-    let name = name_of_path(&options.scans);
+fn rays_begun(input: &ScanInput, map: &MapReader) -> RayConfig {
+    let name = input.name_of_paths();
     let inputs = map.metadata().ext.as_ref().map_or(&[][..], |ext| &ext.inputs);
     let input = inputs.iter().rfind(|input| input.is_named(&name)).or(inputs.last());
     input.and_then(|input| input.rays).unwrap_or(map.config().rays)

@@ -139,6 +139,42 @@ impl Summary {
     }
 }
 
+impl Summary {
+    /// Returns the summary of two runs of one command. Sizes and states are those of the later one.
+    pub(crate) fn after(mut self, earlier: Self) -> Self {
+        self.scans += earlier.scans;
+        self.resumed_after += earlier.resumed_after;
+        self.left_out += earlier.left_out;
+        self.report += earlier.report;
+        self.loads += earlier.loads;
+        self.saves += earlier.saves;
+        let (io, before) = (&mut self.io, earlier.io);
+        io.loads += before.loads;
+        io.prefetches += before.prefetches;
+        io.saves += before.saves;
+        io.encoded += before.encoded;
+        io.decoded += before.decoded;
+        io.hits += before.hits;
+        io.bytes_read += before.bytes_read;
+        io.bytes_written += before.bytes_written;
+        // Percentiles of both cannot be computed: those of the run that waited more are reported.
+        let stalls = [earlier.stalls, self.stalls];
+        let most = if stalls[0].count > stalls[1].count { stalls[0] } else { stalls[1] };
+        self.stalls = most;
+        self.stalls.count = stalls[0].count + stalls[1].count;
+        self.stalls.worst_us = stalls[0].worst_us.max(stalls[1].worst_us);
+        self.poses = match (earlier.poses, self.poses) {
+            (Some(first), Some(next)) if !first.split(", ").any(|known| known == next) => {
+                Some(format!("{first}, {next}"))
+            }
+            (first, next) => first.or(next),
+        };
+        self.unread.splice(0..0, earlier.unread);
+        self.remarks.splice(0..0, earlier.remarks);
+        self
+    }
+}
+
 impl OctreeWork {
     fn of(mapper: &impl MapView) -> Option<Self> {
         let OctreeConfig::Pointers(cache) = mapper.config().octree else { return None };

@@ -8,8 +8,8 @@ use voxtile_pipeline::{FlushEvery, WhenBehind};
 #[derive(Debug, Args)]
 #[command(allow_negative_numbers = true)]
 pub struct BuildArgs {
-    #[arg(value_name = "SCANS", help = help::SCANS_OR_MAP)]
-    pub scans: PathBuf,
+    #[arg(value_name = "SCANS", required = true, help = help::SCANS_OR_MAP)]
+    pub scans: Vec<PathBuf>,
     #[arg(short = 'o', long = "output", value_name = "MAP", help = help::MAP)]
     pub output: PathBuf,
     /// Edge length of a voxel, in metres [default: 0.1, or the map's]
