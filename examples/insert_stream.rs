@@ -17,7 +17,6 @@ type Points = Vec<Point>;
 
 /// The same value is passed to OctoMap.
 const MAX_RANGE_M: f64 = 60.0;
-const TILE_SIZE_M: f64 = 10.0;
 
 fn main() -> Result<(), Box<dyn Error>> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
@@ -25,7 +24,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         return Err("usage: insert_stream STREAM RESOLUTION_M MAP_FOLDER".into());
     };
     // All tiles remain in memory, because the comparison is about the map and not about disk access.
-    let config = MapConfig::new(resolution_m.parse()?, TILE_SIZE_M)?
+    let config = MapConfig::with_resolution(resolution_m.parse()?)?
         .with_range(0.0, MAX_RANGE_M)
         .with_cache_tiles(1 << 20);
     let mut mapper = OutOfCoreTileMapper::create(folder, config)?;

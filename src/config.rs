@@ -218,6 +218,15 @@ impl MapConfig {
         Ok(Self { grid: Grid::new(resolution_m, tile_size_m)?, ..Self::default() })
     }
 
+    /// Returns the default configuration with another resolution in metres and the tile size that follows from it.
+    ///
+    /// # Errors
+    ///
+    /// As for [`Grid::with_resolution`].
+    pub fn with_resolution(resolution_m: f64) -> Result<Self> {
+        Ok(Self { grid: Grid::with_resolution(resolution_m)?, ..Self::default() })
+    }
+
     /// Sets the sensor model.
     pub fn with_sensor_model(self, sensor_model: SensorModel) -> Self {
         Self { sensor_model, ..self }

@@ -4,7 +4,7 @@ use crate::arrays::object;
 use crate::errors::exception_of_any;
 use crate::keywords::Keywords;
 use crate::operations::map_id_of;
-use crate::options::{build_options, export_options};
+use crate::options::{Paths, build_options, export_options};
 use crate::watched::{Reporter, run_detached};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -21,13 +21,13 @@ use voxtile_pipeline::{Listener, Watch, WhichPoints, build, export, export_scans
 #[pyo3(signature = (scans, output, options, progress=None, *, shard_of=None))]
 pub fn call_build<'py>(
     py: Python<'py>,
-    scans: PathBuf,
+    scans: Paths,
     output: PathBuf,
     options: &Bound<'py, PyDict>,
     progress: Option<Py<PyAny>>,
     shard_of: Option<&str>,
 ) -> PyResult<Bound<'py, PyAny>> {
-    let mut options = build_options(py, &scans, output, Keywords::of(options)?)?;
+    let mut options = build_options(py, scans, output, Keywords::of(options)?)?;
     options.piece_of = shard_of.map(|digits| map_id_of(py, "shard_of", digits)).transpose()?;
     called(py, progress, move |watch| {
         let summary = build(&options, watch)?.ok_or(Error::Stopped)?;

@@ -10,7 +10,7 @@ use voxtile::{Clearing, InsertMode, MapConfig, MemoryLimit, SensorModel, Storage
 /// Arguments of [`config_of`].
 pub struct ConfigArguments<'a, 'py> {
     pub resolution: f64,
-    pub tile_size: f64,
+    pub tile_size: Option<f64>,
     pub min_range: f64,
     pub max_range: Option<f64>,
     pub insert_mode: &'a str,
@@ -47,7 +47,11 @@ pub fn config_of(py: Python<'_>, arguments: &ConfigArguments<'_, '_>) -> PyResul
             return Err(wrong(py, "sensor_model", format!("{other:?} is neither 'log-odds' nor 'iwlo'")));
         }
     };
-    let mut config = MapConfig::new(arguments.resolution, arguments.tile_size)
+    let config = match arguments.tile_size {
+        Some(tile_size) => MapConfig::new(arguments.resolution, tile_size),
+        None => MapConfig::with_resolution(arguments.resolution),
+    };
+    let mut config = config
         .map_err(raised)?
         .with_sensor_model(sensor_model)
         .with_range(arguments.min_range, arguments.max_range)

@@ -173,19 +173,19 @@ impl Map {
 impl Map {
     /// Creates a map in a folder that is empty or does not exist.
     ///
-    /// Lengths are in metres. `memory` bounds all memory that grows with the map: bytes, or a text such as "512MiB"
+    /// Lengths are in metres. `tile_size` is a whole number of voxels, by default the one nearest to 10. `memory` bounds all memory that grows with the map: bytes, or a text such as "512MiB"
     /// (the default). `insert_mode` is "per-scan" or "per-ray", `clearing` "octomap" or "guarded",
     /// `sensor_model` "log-odds" or "iwlo", `storage` "octomap" or "compact". `probabilities` of the log-odds model are
     /// those of a hit and a miss, then the minimum and the maximum.
     #[staticmethod]
-    #[pyo3(signature = (path, resolution=0.1, *, tile_size=10.0, min_range=0.0, max_range=None, insert_mode="per-scan",
+    #[pyo3(signature = (path, resolution=0.1, *, tile_size=None, min_range=0.0, max_range=None, insert_mode="per-scan",
         clearing="octomap", sensor_model="log-odds", probabilities=None, occupancy_threshold=0.5, storage="octomap", memory=None, keep_scans=false))]
     #[expect(clippy::too_many_arguments, reason = "keywords, in Python")]
     fn create(
         py: Python<'_>,
         path: PathBuf,
         resolution: f64,
-        tile_size: f64,
+        tile_size: Option<f64>,
         min_range: f64,
         max_range: Option<f64>,
         insert_mode: &str,

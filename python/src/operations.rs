@@ -10,9 +10,10 @@ use serde::Serialize;
 use std::path::{Path, PathBuf};
 use voxtile::integrity::VerifyScope;
 use voxtile::mapper::{MapReader, MapView, OctreeMap};
-use voxtile::operations::{self, Decay, Part, Prefer};
+use voxtile::operations::{self, AreaPart, Decay, Part, Prefer};
+use voxtile::space::Grid;
 use voxtile::{MapPath, MemoryLimit, Result, SnapshotName, Stop, TileIndex, integrity};
-use voxtile_pipeline::{check_is_no_file, octree_file};
+use voxtile_pipeline::{PolygonFile, check_is_no_file, octree_file};
 
 /// A map, or a tuple of a map and the name of a snapshot.
 #[derive(FromPyObject)]
@@ -201,6 +202,15 @@ pub fn replace_tiles<'py>(
     })
 }
 
+/// Returns the tile size in metres that a new map of a resolution in metres has by default.
+#[pyfunction]
+pub fn default_tile_size(py: Python<'_>, resolution: f64) -> PyResult<f64> {
+    match Grid::with_resolution(resolution) {
+        Ok(grid) => Ok(grid.tile_size_m()),
+        Err(error) => Err(exception(py, &error.into())),
+    }
+}
+
 /// Describes a map: id, flush and scan numbers, number of records in its list of scans (`None` if unknown), grid and
 /// range in metres, whether it keeps its scans.
 #[pyfunction]
@@ -234,19 +244,39 @@ struct Described {
     max_range: Option<f64>,
 }
 
-/// Makes a map of the part of another that is inside a box, or outside it. With `shard_of` it makes a shard of the map
-/// with this id; the shard is not durable until `move_shard` has moved it.
+/// Makes a map of the part of another that is inside a box, or outside it. `polygon` replaces the box: a GeoJSON file of
+/// polygons in the map's coordinates, with heights `z`, the lowest and the highest, in metres (default: all). With
+/// `shard_of` it makes a shard of the map with this id; the shard is not durable until `move_shard` has moved it.
 #[pyfunction]
-#[pyo3(signature = (map, output, region, *, outside=false, shard_of=None, progress=None))]
+#[pyo3(signature = (map, output, region=None, *, polygon=None, z=None, outside=false, shard_of=None, progress=None))]
+#[expect(clippy::too_many_arguments, reason = "keywords, in Python")]
 pub fn crop<'py>(
     py: Python<'py>,
     map: MapOrSnapshot,
     output: PathBuf,
-    region: &Bound<'py, PyAny>,
+    region: Option<&Bound<'py, PyAny>>,
+    polygon: Option<PathBuf>,
+    z: Option<[f64; 2]>,
     outside: bool,
     shard_of: Option<&str>,
     progress: Callback,
 ) -> PyResult<Bound<'py, PyAny>> {
+    let region = match (region, polygon) {
+        (Some(region), None) if z.is_none() => region,
+        (None, Some(_)) if shard_of.is_some() => {
+            return Err(wrong(py, "shard_of", "cannot be combined with `polygon`; pass a region"));
+        }
+        (None, Some(polygon)) => {
+            let z_m = z.unwrap_or([f64::NEG_INFINITY, f64::INFINITY]);
+            return reported(py, progress, |_, progress| {
+                let (file, map) = (PolygonFile::read(&polygon)?, map.open()?);
+                let part = AreaPart { area: file.area_in(&map)?, z_m, is_outside: outside };
+                operations::crop_area(&map, &part, &output, |done, all| progress.report(done, all))
+            });
+        }
+        (Some(_), None) => return Err(wrong(py, "z", "belongs to `polygon`; a region has its own heights")),
+        _ => return Err(wrong(py, "region", "pass either `region` or `polygon`")),
+    };
     let part = part_of(region, outside)?;
     let shard_of = shard_of.map(|digits| map_id_of(py, "shard_of", digits)).transpose()?;
     reported(py, progress, |_, progress| {

@@ -72,11 +72,11 @@ pub fn read_options(py: Python<'_>, keywords: &mut Keywords<'_>) -> PyResult<Rea
 /// Takes the options of a build (`voxtile.files.BuildOptions`) from the keywords.
 pub fn build_options(
     py: Python<'_>,
-    scans: &Path,
+    scans: Paths,
     output: PathBuf,
     mut keywords: Keywords<'_>,
 ) -> PyResult<BuildOptions> {
-    let mut options = BuildOptions::new(no_stream(scans), output);
+    let mut options = BuildOptions { scans: scans.without_stream(), ..BuildOptions::new("", output) };
     options.read = read_options(py, &mut keywords)?;
     options.resolution_m = keywords.number("resolution")?;
     options.tile_size_m = keywords.number("tile_size")?;
@@ -140,8 +140,25 @@ pub fn export_options(
     Ok(options)
 }
 
+/// One path, or a sequence of paths.
+#[derive(FromPyObject)]
+pub enum Paths {
+    One(PathBuf),
+    Several(Vec<PathBuf>),
+}
+
+impl Paths {
+    /// Returns the paths of files and folders. Here `-` is a file name, not standard input.
+    pub fn without_stream(self) -> Vec<PathBuf> {
+        match self {
+            Self::One(path) => vec![no_stream(&path)],
+            Self::Several(paths) => paths.iter().map(|path| no_stream(path)).collect(),
+        }
+    }
+}
+
 /// Returns the path of a file or folder. Here `-` is a file name, not standard input.
-pub fn no_stream(path: &Path) -> PathBuf {
+fn no_stream(path: &Path) -> PathBuf {
     if path.as_os_str() == "-" { Path::new(".").join(path) } else { path.to_owned() }
 }
 

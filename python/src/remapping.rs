@@ -10,7 +10,6 @@ use pyo3::types::PyDict;
 use std::path::PathBuf;
 use voxtile::mapper::KeptSummary;
 use voxtile::operations::{self, NewPoses, Remap, Replay, ScanSelection};
-use voxtile::space::Grid;
 use voxtile::{InsertMode, MapView};
 use voxtile_clean::Clean;
 
@@ -95,10 +94,8 @@ pub fn remap_as<'py>(
     reported(py, progress, |stop, progress| {
         let reader = map.open()?;
         let own = reader.config().clone();
-        let edges =
-            (resolution.unwrap_or(own.grid.resolution_m()), tile_size.unwrap_or(own.grid.tile_size_m()));
         let mut config = own.with_kept_scans(keep_scans);
-        config.grid = Grid::new(edges.0, edges.1)?;
+        config.grid = config.grid.replaced(resolution, tile_size)?;
         config.storage = storage.unwrap_or(config.storage);
         config.memory = memory;
         let rays = |rays: &voxtile::RayConfig| {

@@ -3,7 +3,7 @@
 use crate::arrays::{column, rows};
 use crate::errors::{exception, exception_of_any};
 use crate::keywords::Keywords;
-use crate::options::{no_stream, read_options};
+use crate::options::{Paths, read_options};
 use crate::pose::matrix_of;
 use crate::watched::run_detached;
 use numpy::{PyArray1, PyArray2};
@@ -131,40 +131,41 @@ impl ScanIterator {
     }
 }
 
-/// A path and the options to read it.
+/// Paths and the options to read them.
 struct Input {
-    path: PathBuf,
+    paths: Vec<PathBuf>,
     options: ReadOptions,
     /// Whether any option was passed.
     has_options: bool,
 }
 
 impl Input {
-    fn of(py: Python<'_>, path: &Path, options: &Bound<'_, PyDict>) -> PyResult<Self> {
+    fn of(py: Python<'_>, paths: Paths, options: &Bound<'_, PyDict>) -> PyResult<Self> {
         let mut keywords = Keywords::of(options)?;
         let read = read_options(py, &mut keywords)?;
         keywords.end()?;
-        Ok(Self { path: no_stream(path), options: read, has_options: !options.is_empty() })
+        Ok(Self { paths: paths.without_stream(), options: read, has_options: !options.is_empty() })
     }
 
     fn open(&self) -> anyhow::Result<Scans> {
-        if self.has_options || !is_map(&self.path) {
+        let [path] = &self.paths[..] else { return Ok(Scans::Input(self.source()?)) };
+        if self.has_options || !is_map(path) {
             return Ok(Scans::Input(self.source()?));
         }
-        let reader = MapReader::open(&self.path, 0)?;
+        let reader = MapReader::open(path, 0)?;
         let count = reader.kept_summary()?.scans().len();
         Ok(Scans::Kept(Box::new(reader.kept_scans()?), count))
     }
 
     fn source(&self) -> anyhow::Result<Box<dyn ScanSource + Send>> {
-        Ok(voxtile_pipeline::open_scans(&self.path, &self.options, &Watch::silent())?)
+        Ok(voxtile_pipeline::open_paths(&self.paths, &self.options, &Watch::silent())?)
     }
 }
 
-/// Opens the scans of a path.
+/// Opens the scans of a path, or of several.
 #[pyfunction]
-pub fn open_scans(py: Python<'_>, path: PathBuf, options: &Bound<'_, PyDict>) -> PyResult<ScanIterator> {
-    let input = Input::of(py, &path, options)?;
+pub fn open_scans(py: Python<'_>, path: Paths, options: &Bound<'_, PyDict>) -> PyResult<ScanIterator> {
+    let input = Input::of(py, path, options)?;
     let opened = run_detached(py, &Stop::default(), move || input.open())?;
     let scans = opened.map_err(|error| exception_of_any(py, &error))?;
     let count = match &scans {
@@ -187,12 +188,12 @@ type Reach = (String, Option<(f64, f64, f64, f64)>);
 #[pyo3(signature = (path, options, *, max_range=None, no_return_range=None))]
 pub fn scan_reaches(
     py: Python<'_>,
-    path: PathBuf,
+    path: Paths,
     options: &Bound<'_, PyDict>,
     max_range: Option<f64>,
     no_return_range: Option<f64>,
 ) -> PyResult<Vec<Reach>> {
-    let input = Input::of(py, &path, options)?;
+    let input = Input::of(py, path, options)?;
     let stop = Stop::default();
     let asked = stop.clone();
     let reaches = run_detached(py, &stop, move || -> anyhow::Result<Vec<Reach>> {
@@ -210,8 +211,8 @@ pub fn scan_reaches(
 
 /// Returns the number of scans of a path. Reads them if the format does not store their number.
 #[pyfunction]
-pub fn count_scans(py: Python<'_>, path: PathBuf, options: &Bound<'_, PyDict>) -> PyResult<usize> {
-    let input = Input::of(py, &path, options)?;
+pub fn count_scans(py: Python<'_>, path: Paths, options: &Bound<'_, PyDict>) -> PyResult<usize> {
+    let input = Input::of(py, path, options)?;
     let counted = run_detached(py, &Stop::default(), move || -> anyhow::Result<usize> {
         let mut scans = input.source()?;
         match scans.len_hint() {

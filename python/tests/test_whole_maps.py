@@ -173,6 +173,43 @@ def test_crop_clear_merge(city: Path, tmp_path: Path) -> None:
         voxtile.merge([tmp_path / "inside", tmp_path / "outside"], tmp_path / "no", prefer="none")
 
 
+def test_crop_by_a_polygon(city: Path, tmp_path: Path) -> None:
+    square = [[-2, -2], [2, -2], [2, 2], [-2, 2], [-2, -2]]
+    polygon = tmp_path / "square.geojson"
+    polygon.write_text(json.dumps({"type": "Polygon", "coordinates": [square]}))
+    voxtile.crop(city, tmp_path / "inside", [[-2, -2, -0.5], [2, 2, 0.5]])
+    voxtile.crop(city, tmp_path / "cut", polygon=polygon, z=(-0.5, 0.5))
+    assert voxtile.digest(tmp_path / "cut") == voxtile.digest(tmp_path / "inside")
+    voxtile.crop(city, tmp_path / "rest", polygon=polygon, outside=True)
+    with voxtile.open(tmp_path / "rest") as rest:
+        centers, _ = rest.occupied()
+        assert len(centers) and (np.abs(centers[:, :2]).max(axis=1) > 2).all()
+    for wrong in ({}, {"region": [[0, 0, 0], [1, 1, 1]], "polygon": polygon}, {"polygon": polygon, "shard_of": "1" * 32}):
+        with pytest.raises(errors.ArgumentError, match="^(region|shard_of): "):
+            voxtile.crop(city, tmp_path / "no", **wrong)  # type: ignore[arg-type]
+    with pytest.raises(errors.ArgumentError, match="^z: "):
+        voxtile.crop(city, tmp_path / "no", [[0, 0, 0], [1, 1, 1]], z=(0, 1))
+
+
+def test_builds_take_several_paths_and_any_resolution(scans: Path, room: list[Scan], tmp_path: Path) -> None:
+    files = sorted(scans.glob("*.pcd"), key=lambda path: int(path.stem))
+    done: list[tuple[int, int]] = []
+    report = voxtile.build(files, tmp_path / "files", resolution=0.15, progress=lambda *now: done.append(now))
+    assert report["scans"] == len(files) == done[-1][0] and report["tile_size_m"] == 10.05
+    voxtile.build(scans, tmp_path / "folder", resolution=0.15)
+    assert voxtile.digest(tmp_path / "files") == voxtile.digest(tmp_path / "folder")
+    with voxtile.Map.create(tmp_path / "made", 0.15, max_range=100.0) as made:
+        assert made.tile_size == 10.05
+        made.insert_many(voxtile.scans(files))
+        assert made.digest() == voxtile.digest(tmp_path / "files")
+    with pytest.raises(errors.ArgumentError, match="given twice"):
+        voxtile.build([files[0], files[0]], tmp_path / "twice")
+    with pytest.raises(errors.ArgumentError, match="none"):
+        voxtile.build([], tmp_path / "nothing")
+    with pytest.raises(errors.VoxtileError, match="10.05"):
+        voxtile.Map.create(tmp_path / "odd", 0.15, tile_size=10.0)
+
+
 def test_decay_verify_repair(city: Path) -> None:
     sums = voxtile.decay(city, 2.0, scans=2)
     assert sums["factor"] == 0.5 and sums["voxels"] > 0

@@ -1,5 +1,5 @@
 use super::map_writer::{MapWriter, WrittenMap};
-use super::part::{Part, Share};
+use super::part::{AreaPart, Part, Share, VoxelPart};
 use super::table_change::voxels_of_part;
 use crate::error::Result;
 use crate::mapper::{MapReader, MapView};
@@ -23,7 +23,23 @@ pub fn crop(
     output: impl AsRef<Path>,
     progress: impl FnMut(u64, u64),
 ) -> Result<WrittenMap> {
-    crop_to(map, part, MapPath::on(map.disk(), output), new_map_id(), progress)
+    let part = part.voxels(&map.config().grid)?;
+    crop_to(map, &part, MapPath::on(map.disk(), output), new_map_id(), progress)
+}
+
+/// Like [`crop`], for a part of space over an area. Tiles beside the area are not read.
+///
+/// # Errors
+///
+/// As for [`crop`]. Also fails if no center of a voxel is between the heights.
+pub fn crop_area(
+    map: &MapReader,
+    part: &AreaPart,
+    output: impl AsRef<Path>,
+    progress: impl FnMut(u64, u64),
+) -> Result<WrittenMap> {
+    let part = part.voxels(&map.config().grid)?;
+    crop_to(map, &part, MapPath::on(map.disk(), output), new_map_id(), progress)
 }
 
 /// Like [`crop`], for a shard of a future map with the id `map_id` ([`move_shard`](super::move_shard())). The shard is
@@ -40,18 +56,18 @@ pub fn crop_shard(
     progress: impl FnMut(u64, u64),
 ) -> Result<WrittenMap> {
     let disk = Arc::new(UnsyncedDisk::of(map.disk()));
-    crop_to(map, part, MapPath::on(disk, output), map_id, progress)
+    let part = part.voxels(&map.config().grid)?;
+    crop_to(map, &part, MapPath::on(disk, output), map_id, progress)
 }
 
 fn crop_to(
     map: &MapReader,
-    part: &Part,
+    part: &VoxelPart,
     output: MapPath,
     map_id: [u8; 16],
     mut progress: impl FnMut(u64, u64),
 ) -> Result<WrittenMap> {
     let grid = map.config().grid;
-    let part = part.voxels(&grid)?;
     let (disk, output) = output.into_parts();
     let mut writer = MapWriter::create_as(disk, &output, metadata_of_part(map, map_id))?;
     writer.take_scans_of(map)?;
@@ -63,7 +79,7 @@ fn crop_to(
         match part.share_of(&found.voxel_box()) {
             Share::Nothing => {}
             Share::Everything => writer.put(tile, found.table())?,
-            Share::Some => writer.put(tile, &voxels_of_part(found.table(), &found.voxel_box(), &part))?,
+            Share::Some => writer.put(tile, &voxels_of_part(found.table(), &found.voxel_box(), part))?,
         }
     }
     progress(tiles.len() as u64, tiles.len() as u64);

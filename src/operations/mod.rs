@@ -41,7 +41,7 @@ mod table_merge;
 
 pub use clear::{Cleared, clear};
 pub use convert::convert;
-pub use crop::{crop, crop_shard};
+pub use crop::{crop, crop_area, crop_shard};
 pub use decay::{Decay, Decayed, decay};
 pub use diff::{Diff, TileChange, TileDiff, VoxelDiff, diff};
 pub use import::import;
@@ -50,7 +50,7 @@ pub use kept_bytes::{KeptBytes, kept_bytes};
 pub use map_writer::{MapWriter, WrittenMap};
 pub use merge::{Merged, merge};
 pub use merge_rule::Prefer;
-pub use part::Part;
+pub use part::{AreaPart, Part};
 pub use remapping::{
     NewPoses, OnlineRemap, PointsRemoved, Rebuilt, Remap, Remapped, Replay, Replayed, ScanSelection,
     ScansRemoved, SnapshotFailure, mark_moving, rebuild, remap, remove_points, remove_scans,

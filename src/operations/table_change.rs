@@ -2,7 +2,7 @@
 
 use super::part::VoxelPart;
 use crate::sensor::Evidence;
-use crate::space::{BRICK_EDGE, BrickMask, VoxelBox, VoxelIndex, mask_of_box};
+use crate::space::{BRICK_EDGE, VoxelBox};
 use crate::tile::Table;
 
 /// Returns the table of the voxels in a part of space. `tile` is the box of the tile's voxels.
@@ -13,20 +13,13 @@ pub(super) fn voxels_of_part(table: &Table, tile: &VoxelBox, part: &VoxelPart) -
         // A brick can extend beyond the tile, so its position is computed from a voxel inside.
         let Some((code, _)) = table.voxels_of_brick(brick).next() else { continue };
         let first = code.to_key().to_index_from(tile.min).map(|k| k & !(BRICK_EDGE - 1));
-        let mask = mask_of_part(first, part);
+        let mask = part.mask_of_brick(first, tile);
         run.clear();
         let voxels = table.voxels_of_mask(brick, mask);
         run.extend(voxels.map(|(code, evidence)| (code.place_in_brick(), evidence)));
         kept.insert(brick, &run);
     }
     kept
-}
-
-/// Returns the voxels of a brick that belong to a part. `first` is the lowest voxel of the brick.
-fn mask_of_part(first: VoxelIndex, part: &VoxelPart) -> BrickMask {
-    let local = |of: VoxelIndex| std::array::from_fn(|k| of[k].saturating_sub(first[k]));
-    let mask = mask_of_box(local(part.voxels.min), local(part.voxels.end));
-    if part.is_outside { mask.map(|word| !word) } else { mask }
 }
 
 /// Applies `change` to each voxel's evidence. Voxels without a result are removed.

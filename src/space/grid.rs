@@ -5,6 +5,12 @@ use thiserror::Error;
 /// Maximum number of voxels along the edge of a tile.
 pub const MAX_VOXELS_PER_TILE_EDGE: u32 = 1024;
 
+/// Edge in metres that the tiles of a new map have, where it is a whole number of voxels.
+const TILE_SIZE_M: f64 = 10.0;
+
+/// Maximum number of voxels along the edge of a tile of default size: such a map fits in the default memory.
+const MAX_VOXELS_OF_DEFAULT_TILE: f64 = 256.0;
+
 /// Largest index of a voxel along an axis. The next value is only used as the end of half-open boxes.
 pub const LAST_VOXEL_INDEX: i32 = i32::MAX - 1;
 
@@ -90,6 +96,40 @@ impl Grid {
             voxels_per_tile_edge: whole as i32,
             tiles_per_voxel: ((1_u64 << 63) / whole as u64) as i64,
         })
+    }
+
+    /// Creates a grid with voxels of `resolution_m` in metres. A tile is the whole number of voxels, from 2 to 256,
+    /// whose edge is nearest to 10 m: exactly 10 m at 0.05, 0.1 or 0.2 m, 10.05 m at 0.15 m, 2.56 m at 0.01 m.
+    ///
+    /// # Errors
+    ///
+    /// Fails if the resolution is not positive and finite, or so large that a tile is not finite.
+    pub fn with_resolution(resolution_m: f64) -> Result<Self, GridError> {
+        let whole = (TILE_SIZE_M / resolution_m).round().clamp(2.0, MAX_VOXELS_OF_DEFAULT_TILE);
+        let tile_size_m = whole * resolution_m;
+        // The first length that is that many voxels: without noise of rounding, if it can be.
+        [TILE_SIZE_M, readable(tile_size_m)]
+            .into_iter()
+            .filter_map(|length_m| Self::new(resolution_m, length_m).ok())
+            .find(|grid| f64::from(grid.voxels_per_tile_edge) == whole)
+            .map_or_else(|| Self::new(resolution_m, tile_size_m), Ok)
+    }
+
+    /// Returns this grid with other lengths in metres, where they are given. Without a tile size it keeps its own; if
+    /// that is no whole number of the new voxels, it has the one of [`Grid::with_resolution`].
+    ///
+    /// # Errors
+    ///
+    /// As for [`Grid::new`].
+    pub fn replaced(&self, resolution_m: Option<f64>, tile_size_m: Option<f64>) -> Result<Self, GridError> {
+        match (resolution_m, tile_size_m) {
+            (None, None) => Ok(*self),
+            (None, Some(tile_size_m)) => Self::new(self.resolution_m, tile_size_m),
+            (Some(resolution_m), Some(tile_size_m)) => Self::new(resolution_m, tile_size_m),
+            (Some(resolution_m), None) => {
+                Self::new(resolution_m, self.tile_size_m).or_else(|_| Self::with_resolution(resolution_m))
+            }
+        }
     }
 
     /// Edge of a voxel in metres.
@@ -261,6 +301,56 @@ mod tests {
         }
         assert_eq!(Grid::new(0.05, 10.0).unwrap().voxels_per_tile_edge(), 200);
         assert_eq!(Grid::new(0.1, 102.4).unwrap().voxels_per_tile_edge(), 1024);
+    }
+
+    #[test]
+    fn a_tile_of_any_resolution_is_nearly_10_m() {
+        for resolution in [0.05, 0.1, 0.2, 0.25, 0.5, 1.0, 2.0, 5.0, 10.0 / 3.0, 0.333_333_333_3] {
+            let grid = Grid::with_resolution(resolution).unwrap();
+            assert_eq!(grid, Grid::new(resolution, 10.0).unwrap(), "{resolution}");
+        }
+        let expected = [
+            (0.15, 10.05, 67),
+            (0.3, 9.9, 33),
+            (0.07, 10.01, 143),
+            (3.0, 9.0, 3),
+            (4.0, 12.0, 3),
+            (7.0, 14.0, 2),
+            (25.0, 50.0, 2),
+            (0.04, 10.0, 250),
+            (0.02, 5.12, 256),
+            (0.001, 0.256, 256),
+            (1e-12, 256e-12, 256),
+        ];
+        for (resolution, tile, voxels) in expected {
+            let grid = Grid::with_resolution(resolution).unwrap();
+            assert_eq!((grid.tile_size_m(), grid.voxels_per_tile_edge()), (tile, voxels), "{resolution}");
+        }
+        for step in 1..4000 {
+            let resolution = f64::from(step) * 0.0037;
+            let grid = Grid::with_resolution(resolution).unwrap();
+            let off = (grid.tile_size_m() - 10.0).abs();
+            let is_near = off <= resolution * 0.500_001;
+            assert!(is_near || [2, 256].contains(&grid.voxels_per_tile_edge()), "{resolution}");
+        }
+        for wrong in [0.0, -0.1, f64::NAN, f64::INFINITY, 1e-320] {
+            let error = Grid::with_resolution(wrong).unwrap_err();
+            assert!(matches!(error, GridError::Resolution(_)), "{wrong}: {error}");
+        }
+        assert!(Grid::with_resolution(f64::MAX).is_err());
+    }
+
+    #[test]
+    fn a_grid_keeps_the_lengths_that_are_not_replaced() {
+        let grid = Grid::new(0.1, 5.0).unwrap();
+        let lengths = |resolution, tile| {
+            grid.replaced(resolution, tile).map(|grid| (grid.resolution_m(), grid.tile_size_m()))
+        };
+        assert_eq!(lengths(None, None), Ok((0.1, 5.0)));
+        assert_eq!(lengths(None, Some(2.0)), Ok((0.1, 2.0)));
+        assert_eq!(lengths(Some(0.25), None), Ok((0.25, 5.0)));
+        assert_eq!(lengths(Some(0.15), None), Ok((0.15, 10.05)));
+        assert!(lengths(Some(0.15), Some(5.0)).is_err());
     }
 
     #[test]

@@ -9,6 +9,7 @@
 //! Therefore each voxel belongs to exactly one tile.
 
 mod aabb;
+mod area;
 mod brick;
 mod grid;
 mod hash_table;
@@ -22,6 +23,7 @@ mod tile_table;
 mod torus;
 
 pub use aabb::{Aabb, VoxelBox};
+pub use area::{Area, AreaError, AreaRing, ColumnMask};
 pub use brick::ones;
 pub use brick::{
     BRICK_EDGE, BRICK_VOXELS, BrickCode, BrickMask, add_to_mask, is_in_mask, mask_of_box, place_of_voxel,

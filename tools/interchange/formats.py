@@ -10,6 +10,7 @@ import laspy
 import numpy as np
 import pyarrow.parquet
 import pye57
+import rasterio
 import trimesh
 import yaml
 from mcap.reader import make_reader
@@ -136,6 +137,32 @@ def heightmap(scene):
         top[x, y] = max(top.get((x, y), z), z)
     assert {(x, y): z for x, y, z in index.tolist()} == top, "heights differ"
     return f"{len(top)} heights"
+
+
+def geotiff(scene):
+    columns = {}
+    for x, y, z in scene.voxels[scene.log_odds >= 0].tolist():
+        columns.setdefault((x, y), []).append(z)
+    with rasterio.open(scene.write("geotiff", "dem.tif", "--crs", "EPSG:25832")) as raster:
+        assert raster.crs.to_epsg() == 25832 and raster.dtypes == ("float32",) * 3 and np.isnan(raster.nodatavals).all()
+        assert raster.profile["compress"] == "deflate" and raster.block_shapes == [(256, 256)] * 3
+        assert raster.descriptions[0].startswith("top of the highest")
+        low, high = scene.voxels.min(0)[:2], scene.voxels.max(0)[:2] + 1
+        bounds = np.concatenate([low, high]) * RESOLUTION + [*scene.origin[:2]] * 2
+        assert np.abs(np.array(raster.bounds) - bounds).max() < 1e-6, f"{raster.bounds}, not {bounds}"
+        bands = raster.read()
+        rows, at = np.nonzero(~np.isnan(bands[0]))
+        places = np.stack(raster.xy(rows, at), 1)
+    index = np.floor((places - scene.origin[:2]) / RESOLUTION).astype(np.int64)
+    assert {tuple(column) for column in index.tolist()} == set(columns), "columns differ"
+    found = bands[:, rows, at] - scene.origin[2]
+    zs = [columns[x, y] for x, y in index.tolist()]
+    wanted = [[max(z) + 1 for z in zs], [min(z) for z in zs], [sum(z) / len(z) + 0.5 for z in zs]]
+    off = np.abs(found - np.array(wanted) * RESOLUTION).max()
+    assert off < 1e-4, f"heights are {off} m off"
+    with rasterio.open(scene.write("geotiff", "local.tif")) as raster:
+        assert "voxels" in raster.crs.to_wkt(), raster.crs
+    return f"{len(columns)} columns, heights {off:.1e} m off at most"
 
 
 def las(scene, format="las", file="a.las"):
@@ -333,7 +360,7 @@ def main():
     program, work = sys.argv[1], Path(sys.argv[2])
     script = sys.argv[4] if sys.argv[3:4] == ["--npm"] else None
     failed = False
-    formats = [xyz, npz, nav2, heightmap, las, laz, glb, quantized_glb, e57, parquet, autoware, copc, mcap]
+    formats = [xyz, npz, nav2, heightmap, geotiff, las, laz, glb, quantized_glb, e57, parquet, autoware, copc, mcap]
     for name in SCENES:
         scene = Scene(name, program, work)
         checks = [(check.__name__, check) for check in formats]

@@ -20,7 +20,7 @@ fi
 
 python3 -m venv "$work/venv"
 "$work/venv/bin/pip" install --quiet --disable-pip-version-check numpy pyyaml pillow 'laspy[lazrs]' pye57 pyarrow mcap \
-    mcap-ros2-support trimesh scipy
+    mcap-ros2-support rasterio trimesh scipy
 
 if command -v node >/dev/null && command -v npm >/dev/null; then
     (cd "$work" && npm init --yes >/dev/null && npm install --silent --no-audit --no-fund gltf-validator copc >/dev/null)

@@ -21,7 +21,7 @@ pub use build::{
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use clap_complete::Shell;
 pub use clean::CleanArgs;
-pub use edit::{ClearArgs, CropArgs, DecayArgs, MergeArgs, PartArgs};
+pub use edit::{ClearArgs, CropArgs, DecayArgs, MergeArgs};
 pub use export::{ExportArgs, WhatName};
 pub use local::{LocalArgs, PresetName};
 use log::LevelFilter;
@@ -242,9 +242,9 @@ pub struct ShareArgs {
 #[derive(Debug, Args)]
 #[command(allow_negative_numbers = true)]
 pub struct ScansArgs {
-    /// Input of scans as in build, a map, or MAP@SNAPSHOT
-    #[arg(value_name = "DATA")]
-    pub data: PathBuf,
+    /// Inputs of scans as in build, a map, or MAP@SNAPSHOT
+    #[arg(value_name = "DATA", required = true)]
+    pub data: Vec<PathBuf>,
     /// List each scan: number, time stamp in seconds, origin in metres, points, name
     #[arg(long)]
     pub each: bool,

@@ -42,7 +42,7 @@ pub fn memory_of(memory: Option<ByteSize>) -> MemoryLimit {
 }
 
 fn options_of(args: &BuildArgs) -> voxtile::Result<BuildOptions> {
-    let mut options = BuildOptions::new(&args.scans, &args.output);
+    let mut options = BuildOptions { scans: args.scans.clone(), ..BuildOptions::new("", &args.output) };
     options.read = read_options(&args.read)?;
     options.resolution_m = args.resolution;
     options.tile_size_m = args.tile_size;

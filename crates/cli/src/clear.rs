@@ -24,7 +24,10 @@ struct Summary<'a> {
 
 pub fn run(args: &ClearArgs) -> anyhow::Result<ExitCode> {
     let progress = Progress::over_tiles(0);
-    let cleared = clear(whole_map(&args.map)?, &part_of(&args.part)?, |done, all| progress.set(done, all))?;
+    let cleared =
+        clear(whole_map(&args.map)?, &part_of(&args.part.region, args.part.outside)?, |done, all| {
+            progress.set(done, all)
+        })?;
     drop(progress);
     let mut out = summary_out(args.json);
     if args.json {

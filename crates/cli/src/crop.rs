@@ -9,8 +9,8 @@ use crate::written::{print_written, warn_of_scans_left};
 use serde::Serialize;
 use std::path::Path;
 use std::process::ExitCode;
-use voxtile::operations::{WrittenMap, crop};
-use voxtile_pipeline::memory;
+use voxtile::operations::{AreaPart, Part, WrittenMap, crop, crop_area};
+use voxtile_pipeline::{PolygonFile, memory};
 
 #[derive(Serialize)]
 struct Summary<'a> {
@@ -22,11 +22,38 @@ struct Summary<'a> {
     peak_rss_bytes: Option<u64>,
 }
 
+/// Voxels to keep.
+enum Selected {
+    Box(Part),
+    /// Polygons, and the range of heights in metres.
+    Polygon(Box<PolygonFile>, [f64; 2]),
+}
+
+impl Selected {
+    fn of(args: &CropArgs) -> anyhow::Result<Self> {
+        let Some(path) = &args.polygon else {
+            return Ok(Self::Box(part_of(args.region.as_deref().unwrap_or_default(), args.outside)?));
+        };
+        let z_m = match args.z.as_deref() {
+            Some(&[min_m, max_m]) => [min_m, max_m],
+            _ => [f64::NEG_INFINITY, f64::INFINITY],
+        };
+        Ok(Self::Polygon(Box::new(PolygonFile::read(path)?), z_m))
+    }
+}
+
 pub fn run(args: &CropArgs) -> anyhow::Result<ExitCode> {
     let progress = Progress::over_tiles(0);
-    let (part, output) = (part_of(&args.part)?, whole_map(&args.output)?);
+    let (part, output) = (Selected::of(args)?, whole_map(&args.output)?);
     let (written, warnings) = read_map(&args.map, |map| {
-        let written = crop(map, &part, output, |done, all| progress.set(done, all))?;
+        let report = |done, all| progress.set(done, all);
+        let written = match &part {
+            Selected::Box(part) => crop(map, part, output, report)?,
+            Selected::Polygon(file, z_m) => {
+                let (area, z_m) = (file.area_in(map)?, *z_m);
+                crop_area(map, &AreaPart { area, z_m, is_outside: args.outside }, output, report)?
+            }
+        };
         Ok((written, warn_of_scans_left([map])))
     })?;
     drop(progress);

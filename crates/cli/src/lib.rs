@@ -25,7 +25,6 @@ mod man;
 mod merge;
 mod octree_choice;
 mod octree_info;
-mod one_input;
 mod option_names;
 mod part;
 mod picture;

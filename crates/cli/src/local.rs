@@ -10,15 +10,14 @@ use voxtile::{Error, Scan};
 use voxtile_formats::ScanSource;
 use voxtile_local::{LocalMap, LocalParameters};
 use voxtile_pipeline::output::OutputFile;
-use voxtile_pipeline::{LocalScans, Watch};
-use voxtile_pipeline::{is_standard_input, open_scans};
+use voxtile_pipeline::{LocalScans, Watch, is_standard_input};
 use voxtile_render::{OverTime, Panel};
 
 /// Number of panels in the picture.
 const PANELS: usize = 6;
 
 pub fn run(args: &LocalArgs) -> anyhow::Result<ExitCode> {
-    if is_standard_input(&args.scans) && args.repeat > 1 {
+    if args.scans.iter().any(|scans| is_standard_input(scans)) && args.repeat > 1 {
         let reason = "scans from standard input can be read only once: omit --repeat, or give a file";
         return Err(Error::argument("SCANS", reason).into());
     }
@@ -76,7 +75,7 @@ struct Input {
 impl Input {
     fn of(args: &LocalArgs) -> anyhow::Result<Self> {
         let watch = at_terminal(stop_signal::catch_if_fetched(&args.scans)?);
-        Ok(Self { scans: LocalScans::of(&args.scans, &watch)?, watch })
+        Ok(Self { scans: LocalScans::of(&args.scans, &read_options(&args.read)?, &watch)?, watch })
     }
 }
 
@@ -86,7 +85,7 @@ fn run_scans(
     mut row: Row,
     mut panels: Option<&mut Vec<Panel>>,
 ) -> anyhow::Result<Row> {
-    let mut source = open_scans(input.scans.path(), &read_options(&args.read)?, &input.watch)?;
+    let mut source = input.scans.inputs().open(&read_options(&args.read)?, &input.watch)?;
     let scans = source.len_hint();
     let progress = Progress::over_scans(scans);
     let mut map = LocalMap::new(args.resolution, row.parameters)?;

@@ -1,4 +1,3 @@
-use crate::args::PartArgs;
 use voxtile::Result;
 use voxtile::operations::Part;
 use voxtile::space::{Aabb, Point};
@@ -9,9 +8,9 @@ pub fn region_of(corners: &[f64]) -> Result<Aabb> {
 }
 
 /// Returns the part of space from `--region` and `--outside`.
-pub fn part_of(args: &PartArgs) -> Result<Part> {
-    let region = region_of(&args.region)?;
-    Ok(if args.outside { Part::Outside(region) } else { Part::Inside(region) })
+pub fn part_of(region: &[f64], is_outside: bool) -> Result<Part> {
+    let region = region_of(region)?;
+    Ok(if is_outside { Part::Outside(region) } else { Part::Inside(region) })
 }
 
 /// Returns a point from three coordinates, which the argument parser has counted.

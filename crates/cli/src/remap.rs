@@ -14,7 +14,6 @@ use std::time::Instant;
 use voxtile::mapper::{KeptSummary, MapReader, MapView};
 use voxtile::operations::{Remap, Remapped, rebuild, remap};
 use voxtile::sensor::{Iwlo, SensorModel};
-use voxtile::space::Grid;
 use voxtile::{Error, InsertMode, MapConfig, MemoryLimit, RayConfig};
 use voxtile_formats::Budget;
 use voxtile_pipeline::memory;
@@ -133,11 +132,7 @@ fn build_another(args: &RemapArgs) -> anyhow::Result<ExitCode> {
 }
 
 fn config_of(args: &RemapArgs, own: &MapConfig, memory: MemoryLimit) -> anyhow::Result<MapConfig> {
-    let (resolution_m, tile_size_m) = (
-        args.resolution.unwrap_or(own.grid.resolution_m()),
-        args.tile_size.unwrap_or(own.grid.tile_size_m()),
-    );
-    let grid = Grid::new(resolution_m, tile_size_m).map_err(Error::from)?;
+    let grid = own.grid.replaced(args.resolution, args.tile_size).map_err(Error::from)?;
     let mut config = own.clone().with_kept_scans(args.keep_scans);
     (config.grid, config.memory) = (grid, memory);
     if let Some(storage) = args.storage {

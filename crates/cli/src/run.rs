@@ -6,8 +6,8 @@ use super::failure::JsonTo;
 use super::view;
 use super::{
     build, clean, clear, completions, convert, crop, decay, demo, diff, digest, export, import, info, local,
-    man, merge, one_input, option_names, picture, progress, query, quiet, raycast, remap, remove_points,
-    remove_scans, repair, report, revert, scans, share, snapshot, snapshots, threads, verify,
+    man, merge, option_names, picture, progress, query, quiet, raycast, remap, remove_points, remove_scans,
+    repair, report, revert, scans, share, snapshot, snapshots, threads, verify,
 };
 #[cfg(feature = "bucket")]
 use super::{pull, push};
@@ -28,7 +28,7 @@ pub fn main() -> ExitCode {
 /// Requires a process of its own, because it sets up logging, threads and signal handlers.
 pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
     let matches = Cli::command().try_get_matches_from(with_plain_numbers(arguments));
-    let matches = matches.unwrap_or_else(|error| one_input::explained(error).exit());
+    let matches = matches.unwrap_or_else(|error| error.exit());
     option_names::name_options_of(matches.subcommand_name().unwrap_or_default());
     let cli = Cli::from_arg_matches(&matches).unwrap_or_else(|error| error.exit());
     // Command-line levels override the environment.

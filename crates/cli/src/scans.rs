@@ -8,7 +8,7 @@ use anyhow::Context;
 use indicatif::{HumanBytes, HumanCount};
 use serde::Serialize;
 use std::io::{BufWriter, IntoInnerError, Seek, Write};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use tempfile::SpooledTempFile;
 use voxtile::mapper::MapReader;
@@ -16,9 +16,9 @@ use voxtile::scan::Stop;
 use voxtile::space::Point;
 use voxtile::store::ScanRecord;
 use voxtile_formats::{PointBudget, ScanSource};
+use voxtile_pipeline::LocalScans;
 use voxtile_pipeline::place::url_of;
 use voxtile_pipeline::read_map;
-use voxtile_pipeline::{LocalScans, open_scans};
 
 /// Memory for the points of a scan, in bytes; larger scans use a temporary file.
 const POINTS_BYTES: usize = 64 << 20;
@@ -60,7 +60,10 @@ struct Row {
 
 pub fn run(args: &ScansArgs) -> anyhow::Result<ExitCode> {
     let mut out = BufWriter::new(std::io::stdout().lock());
-    let overview = if is_map(&args.data)? { of_map(args, &mut out)? } else { of_input(args, &mut out)? };
+    let overview = match &args.data[..] {
+        [map] if is_map(map)? => of_map(map, args, &mut out)?,
+        _ => of_input(args, &mut out)?,
+    };
     if args.json {
         json::print(&overview, &mut out)?;
     } else {
@@ -80,9 +83,9 @@ fn is_map(path: &Path) -> voxtile::Result<bool> {
     }
 }
 
-fn of_map(args: &ScansArgs, out: &mut impl Write) -> anyhow::Result<Overview> {
+fn of_map(map: &Path, args: &ScansArgs, out: &mut impl Write) -> anyhow::Result<Overview> {
     // `read_map` may repeat this closure after a failure: print only after it succeeds.
-    let (overview, mut rows) = read_map(&args.data, |reader| {
+    let (overview, mut rows) = read_map(map, |reader| {
         let mut rows = BufWriter::new(SpooledTempFile::new(ROWS_BYTES));
         let overview = listed(reader, args, &mut rows)?;
         Ok((overview, rows.into_inner().map_err(IntoInnerError::into_error)?))
@@ -124,8 +127,8 @@ fn of_input(args: &ScansArgs, out: &mut impl Write) -> anyhow::Result<Overview> 
     // List clouds without poses too, with a remark; a build would skip them.
     options.clouds.may_lack_poses = true;
     let watch = at_terminal(stop_signal::catch_if_fetched(&args.data)?);
-    let local = LocalScans::of(&args.data, &watch)?;
-    let mut source: Box<dyn ScanSource + Send> = open_scans(local.path(), &options, &watch)?;
+    let local = LocalScans::of(&args.data, &options, &watch)?;
+    let mut source: Box<dyn ScanSource + Send> = local.inputs().open(&options, &watch)?;
     let progress = Progress::over_scans(source.len_hint());
     let room = PointBudget::new(POINTS_BYTES, &std::env::temp_dir());
     let mut overview = Overview { format: source.format(), points: Some(0), ..Overview::default() };
@@ -168,8 +171,13 @@ impl Overview {
         Ok(())
     }
 
-    fn print(&self, data: &Path, out: &mut impl Write) -> std::io::Result<()> {
-        writeln!(out, "input     {}: {}", data.display(), self.format)?;
+    fn print(&self, data: &[PathBuf], out: &mut impl Write) -> std::io::Result<()> {
+        let first = data.first().map(|path| path.display().to_string()).unwrap_or_default();
+        let others = match data.len() {
+            0 | 1 => String::new(),
+            paths => format!(" and {} more", paths - 1),
+        };
+        writeln!(out, "input     {first}{others}: {}", self.format)?;
         let points = self.points.map_or(String::new(), |points| format!(", {} points", HumanCount(points)));
         writeln!(out, "scans     {}{points}", HumanCount(self.scans))?;
         if let Some(moving @ 1..) = self.moving_points {

@@ -3,7 +3,7 @@ use signal_hook::consts::{SIGINT, SIGTERM};
 use signal_hook::flag;
 use signal_hook::iterator::Signals;
 use std::io::Write;
-use std::path::Path;
+use std::path::PathBuf;
 use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, OnceLock};
 use std::thread;
@@ -41,10 +41,10 @@ pub fn catch_unfinished() -> anyhow::Result<Stop> {
     )
 }
 
-/// Same as `catch`, for reading. If the scans are in a local folder, there is nothing to remove and signals keep their
+/// Same as `catch`, for reading. If all scans are on this machine, there is nothing to remove and signals keep their
 /// default action.
-pub fn catch_if_fetched(scans: &Path) -> anyhow::Result<Stop> {
-    match url_of(scans) {
+pub fn catch_if_fetched(scans: &[PathBuf]) -> anyhow::Result<Stop> {
+    match scans.iter().find_map(|scans| url_of(scans)) {
         Some(_) => catch_with_messages(
             "stopping after removing the downloaded files",
             "stopped at once; the downloaded files remain",

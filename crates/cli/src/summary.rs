@@ -55,7 +55,13 @@ pub fn print(mut summary: Summary, json: bool) -> anyhow::Result<()> {
         writeln!(out, "skipped   {} {cause}", HumanCount(count))?;
     }
     writeln!(out, "voxels    {}, {} occupied", HumanCount(summary.voxels), HumanCount(summary.occupied))?;
-    writeln!(out, "tiles     {}, {} on disk", HumanCount(summary.tiles), HumanBytes(summary.disk_bytes))?;
+    writeln!(
+        out,
+        "tiles     {} of {} m, {} on disk",
+        HumanCount(summary.tiles),
+        summary.grid.tile_size_m(),
+        HumanBytes(summary.disk_bytes)
+    )?;
     let TileCounts { table_bytes, octree_bytes, voxel_cache_bytes, .. } = summary.cached;
     writeln!(
         out,

@@ -1,7 +1,7 @@
 //! Writes the voxels of a CSV table in one of the output formats.
 //!
 //! ```text
-//! write_voxels FORMAT VOXELS.csv OUTPUT [--resolution M] [--origin X Y Z] [--subtract X Y Z] [--quantize]
+//! write_voxels FORMAT VOXELS.csv OUTPUT [--resolution M] [--origin X Y Z] [--subtract X Y Z] [--quantize] [--crs CRS]
 //! ```
 //!
 //! Each line of the table is `ix,iy,iz,log_odds,count`. Tiles have 32 voxels per edge.
@@ -20,6 +20,7 @@ struct Arguments {
     origin_m: [f64; 3],
     subtract_m: [f64; 3],
     is_quantized: bool,
+    crs: String,
 }
 
 fn main() -> ExitCode {
@@ -55,7 +56,7 @@ fn run() -> Result<(), Box<dyn std::error::Error>> {
         occupied_log_odds: 0.0,
     };
     let mut options = WriteOptions::beside(&arguments.output);
-    options.crs = Some("LOCAL_CS[\"voxels\",UNIT[\"metre\",1]]".to_owned());
+    options.crs = Some(arguments.crs);
     options.origin_m = arguments.subtract_m;
     options.is_quantized = arguments.is_quantized;
     options.stamp_ns = 1_700_000_000_123_456_789;
@@ -74,8 +75,17 @@ fn arguments() -> Result<Arguments, String> {
     let format = *OutputFormats::default().of_name(&name).ok_or_else(|| format!("{name} is not a format"))?;
     let (table, output) = (word("VOXELS.csv")?.into(), Path::new(&word("OUTPUT")?).to_owned());
     let (origin_m, subtract_m) = ([0.0; 3], [0.0; 3]);
-    let mut arguments =
-        Arguments { format, table, output, resolution_m: 0.1, origin_m, subtract_m, is_quantized: false };
+    let crs = "LOCAL_CS[\"voxels\",UNIT[\"metre\",1]]".to_owned();
+    let mut arguments = Arguments {
+        format,
+        table,
+        output,
+        resolution_m: 0.1,
+        origin_m,
+        subtract_m,
+        is_quantized: false,
+        crs,
+    };
     let mut rest: Vec<String> = words.collect();
     rest.reverse();
     while let Some(option) = rest.pop() {
@@ -87,6 +97,7 @@ fn arguments() -> Result<Arguments, String> {
             "--resolution" => arguments.resolution_m = number()?,
             "--origin" => arguments.origin_m = [number()?, number()?, number()?],
             "--quantize" => arguments.is_quantized = true,
+            "--crs" => arguments.crs = rest.pop().ok_or("--crs needs a value")?,
             "--subtract" => arguments.subtract_m = [number()?, number()?, number()?],
             _ => return Err(format!("unknown option {option}")),
         }

@@ -12,9 +12,11 @@
 //! `spill/` holds temporary files for data that exceeds the memory budget. The features `las`, `e57`, `ros` and
 //! `sqlite` enable formats with many dependencies.
 
+mod crs_codes;
 mod guess;
 mod input_format;
 mod open;
+mod open_files;
 pub mod poses;
 pub mod read;
 mod read_options;
@@ -25,8 +27,10 @@ mod scans;
 mod spill;
 pub mod write;
 
+pub use crs_codes::epsg_code;
 pub use input_format::{Detection, InputFormat, Open, OpenCloud, OpenClouds, OpenScans};
 pub use open::{open_clouds, open_scans};
+pub use open_files::{DividedInputs, divide_inputs, open_scan_files};
 pub use poses::{CloudOptions, Deskew, PoseSource, RigidPose};
 pub use read::{
     CloudHead, CloudPoint, CloudSource, PoseAt, read_pcd, read_points, read_scan_graph, read_scan_log,

@@ -108,7 +108,7 @@ fn open_as(path: &Path, format: &InputFormat, options: &ReadOptions) -> Result<B
     })
 }
 
-fn check(options: &ReadOptions) -> Result<()> {
+pub(crate) fn check(options: &ReadOptions) -> Result<()> {
     if !(options.scan_period_s >= 0.0 && options.scan_period_s.is_finite()) {
         return Err(Error::argument(
             "scan period",
@@ -157,7 +157,7 @@ fn open_folder(path: &Path, format: InputFormat, options: &ReadOptions) -> Resul
     Ok(Box::new(Files::new(name, paths, is_one_each, open).with_remarks(remarks)))
 }
 
-fn open_file(
+pub(crate) fn open_file(
     path: &Path,
     format: &InputFormat,
     stamps: NameStamps,

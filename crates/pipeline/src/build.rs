@@ -4,7 +4,7 @@ use crate::failed_flush::FailedFlush;
 use crate::flush_schedule::FlushSchedule;
 use crate::ingest::{Ingest, Next, RayNeeds, Taken};
 use crate::pose_check::{Doubt, PoseCheck, check_ahead};
-use crate::scan_input::is_standard_input;
+use crate::scan_input::{ScanInput, ScanInputs, is_standard_input};
 use crate::scan_queue::{ScanQueue, WhenBehind};
 use crate::scan_reader::{FingerprintFn, ScanReader};
 use crate::summary::Summary;
@@ -40,12 +40,61 @@ const MIN_BATCH_BYTES: usize = 3 << 20;
 /// The options do not fit the map or the input, or an input or a map cannot be read or written.
 pub fn build(options: &BuildOptions, watch: &Watch) -> anyhow::Result<Option<Summary>> {
     let started = Instant::now();
-    let stop = watch.stop();
     check_combinations(options)?;
+    let inputs = ScanInputs::of(&options.scans, &options.read, watch.stop())?;
+    inputs.remarks().iter().for_each(|remark| log::warn!("{remark}"));
+    let mut options = options.clone();
+    if inputs.inputs().len() > 1 {
+        check_several(&options)?;
+        options.read.clouds.are_poses_shared = true;
+        options.read.selection = options.read.selection.across_inputs();
+    }
+    let mut all: Option<Summary> = None;
+    for input in inputs.inputs() {
+        if all.is_some() && options.read.selection.is_complete() {
+            break;
+        }
+        let scans = all.as_ref().map_or(0, |all| all.resumed_after + all.scans);
+        let built = build_input(&options, input, scans, watch).map_err(|error| match scans {
+            0 => error,
+            _ => error.context(format!("{scans} scans of the inputs before {input} are in the map")),
+        })?;
+        let Some(built) = built else {
+            all.iter_mut().for_each(|all| all.interrupted = true);
+            break;
+        };
+        let summary = match all.take() {
+            None => built,
+            Some(earlier) => built.after(earlier),
+        };
+        let is_stopped = summary.interrupted;
+        all = Some(summary);
+        if is_stopped {
+            break;
+        }
+        // The map exists now; the next input is another one.
+        options.append = true;
+    }
+    Ok(all.map(|mut all| {
+        all.remarks.splice(0..0, inputs.remarks().iter().cloned());
+        all.seconds = started.elapsed().as_secs_f64();
+        all
+    }))
+}
+
+/// Builds or continues a map with the scans of one input. `scans_before` is the number of scans of the inputs before it.
+fn build_input(
+    options: &BuildOptions,
+    scans: &ScanInput,
+    scans_before: u64,
+    watch: &Watch,
+) -> anyhow::Result<Option<Summary>> {
+    let started = Instant::now();
+    let stop = watch.stop();
     let exists = exists(options)?;
-    let config = if exists { config_to_go_on(options)? } else { config_to_create(options)? };
+    let config = if exists { config_to_go_on(options, scans)? } else { config_to_create(options)? };
     check_no_rays(options, &config)?;
-    check_when_behind(options)?;
+    check_when_behind(options, scans)?;
     // A shard is never resumed or compared, so its scans are not hashed.
     let fingerprint: FingerprintFn = if options.piece_of.is_none() {
         ScanFingerprint::of
@@ -55,15 +104,14 @@ pub fn build(options: &BuildOptions, watch: &Watch) -> anyhow::Result<Option<Sum
     let point_budget = point_budget(options, &config);
     let max_batch = max_batch(options, &config);
     let read = read_options(options, &config);
-    let is_checked = options.strict && check_ahead(&options.scans, &read, &point_budget, watch)?;
-    let opened =
-        ScanReader::open(options.scans.clone(), read.clone(), point_budget, fingerprint, watch.clone())?;
+    let is_checked = options.strict && check_ahead(scans, &read, &point_budget, watch)?;
+    let opened = ScanReader::open(scans.clone(), read.clone(), point_budget, fingerprint, watch.clone())?;
     let Some((reader, input)) = opened else { return Ok(None) };
-    let pose_check = if is_checked { None } else { PoseCheck::of(&read, &input.poses, &options.scans) };
-    let config = config_of_map(options, &config);
+    let pose_check = if is_checked { None } else { PoseCheck::of(&read, &input.poses, scans.first()) };
+    let config = config_of_map(scans, &config);
     let needs = RayNeeds { grid: config.grid, sensor_model: config.sensor_model };
     let mut ingest =
-        Ingest::new(reader, options.scans.clone(), options.skip_bad, (!options.no_rays).then_some(needs));
+        Ingest::new(reader, scans.clone(), options.skip_bad, (!options.no_rays).then_some(needs));
     let mut opened_map = match exists {
         true => Some(OutOfCoreTileMapper::open(map_path(options), config.clone())?),
         false => None,
@@ -74,7 +122,7 @@ pub fn build(options: &BuildOptions, watch: &Watch) -> anyhow::Result<Option<Sum
     let crs = ingest.crs();
     let mapper = match &mut opened_map {
         Some(mapper) => {
-            check_crs(options, crs.as_ref(), config.crs.as_ref())?;
+            check_crs(scans, crs.as_ref(), config.crs.as_ref())?;
             mapper
         }
         none => {
@@ -90,7 +138,7 @@ pub fn build(options: &BuildOptions, watch: &Watch) -> anyhow::Result<Option<Sum
         }
     };
     mapper.stop_with(stop.clone());
-    let Some(resumed_after) = begin(options, mapper, &mut ingest, &input.name)? else {
+    let Some(resumed_after) = begin(options, scans, mapper, &mut ingest, &input.name)? else {
         return Ok(None);
     };
 
@@ -99,8 +147,8 @@ pub fn build(options: &BuildOptions, watch: &Watch) -> anyhow::Result<Option<Sum
     } else if max_batch > 1 {
         ingest.read_ahead(ScanQueue::new(options.when_behind, max_batch));
     }
-    let gauge = watch.over_scans(input.scans);
-    gauge.pass(ingest.content().scans);
+    let gauge = watch.over_scans(input.scans.map(|scans| scans + scans_before as usize));
+    gauge.pass(scans_before + ingest.content().scans);
     let mut build = Build {
         mapper,
         ingest,
@@ -122,7 +170,7 @@ pub fn build(options: &BuildOptions, watch: &Watch) -> anyhow::Result<Option<Sum
     let Build { report, scans, mut ingest, gauge, doubt, .. } = build;
     drop(gauge);
     let mut remarks = ingest.remarks();
-    remarks.iter_mut().for_each(|remark| *remark = format!("{}: {remark}", options.scans.display()));
+    remarks.iter_mut().for_each(|remark| *remark = format!("{scans}: {remark}"));
     remarks.extend(doubt.map(|doubt| doubt.remark()));
     remarks.extend(all_rays_cut(&report, mapper.config()));
     remarks.iter().for_each(|remark| log::warn!("{remark}"));
@@ -278,10 +326,17 @@ fn check_combinations(options: &BuildOptions) -> voxtile::Result<()> {
     Ok(())
 }
 
+/// Checks options that exclude several inputs.
+fn check_several(options: &BuildOptions) -> voxtile::Result<()> {
+    if options.piece_of.is_some() {
+        return Err(Error::argument("scans", "a shard is built from one input"));
+    }
+    Ok(())
+}
+
 /// Checks that the input is a stream, because only streams can be faster than the mapper.
-fn check_when_behind(options: &BuildOptions) -> voxtile::Result<()> {
-    let is_file = options.scans.is_file() || options.scans.is_dir();
-    if options.when_behind == WhenBehind::Wait || !is_file {
+fn check_when_behind(options: &BuildOptions, scans: &ScanInput) -> voxtile::Result<()> {
+    if options.when_behind == WhenBehind::Wait || !scans.is_on_disk() {
         return Ok(());
     }
     let reason = "has no effect on files: omit it, or read a live stream from - or a pipe";
@@ -342,6 +397,7 @@ fn exists(options: &BuildOptions) -> anyhow::Result<bool> {
 /// or `None` if the build was stopped.
 fn begin(
     options: &BuildOptions,
+    scans: &ScanInput,
     mapper: &mut OutOfCoreTileMapper,
     ingest: &mut Ingest,
     name: &str,
@@ -371,7 +427,7 @@ fn begin(
             return Ok(Some(content.scans - content.skipped.len() as u64));
         }
         if content.scans > 0 {
-            return Err(taken_before(options, &inputs[at].name, content.scans));
+            return Err(taken_before(scans, &inputs[at].name, content.scans));
         }
     }
     if let Some(last) = inputs.last().filter(|last| last.content.is_none() && !options.again) {
@@ -380,7 +436,7 @@ fn begin(
         if fingerprint.is_ok_and(|fingerprint| fingerprint == last.name) {
             let done = mapper.scan_number().saturating_sub(last.first_scan);
             if !options.resume {
-                return Err(taken_before(options, name, done));
+                return Err(taken_before(scans, name, done));
             }
             check_begun(options, last, mapper)?;
             return Ok(ingest.pass(done)?.then_some(done));
@@ -447,7 +503,7 @@ fn check_begun(
 }
 
 /// Checks that the coordinate reference systems of input and map agree.
-fn check_crs(options: &BuildOptions, found: Option<&String>, own: Option<&String>) -> voxtile::Result<()> {
+fn check_crs(scans: &ScanInput, found: Option<&String>, own: Option<&String>) -> voxtile::Result<()> {
     match (found, own) {
         (Some(found), Some(own)) if found != own => {
             let reason = format!(
@@ -455,18 +511,18 @@ fn check_crs(options: &BuildOptions, found: Option<&String>, own: Option<&String
                 beginning_or_difference(found, own),
                 beginning_or_difference(own, found)
             );
-            Err(Error::argument(options.scans.display().to_string(), reason))
+            Err(Error::argument(scans.to_string(), reason))
         }
         _ => Ok(()),
     }
 }
 
-fn taken_before(options: &BuildOptions, name: &str, scans: u64) -> anyhow::Error {
+fn taken_before(input: &ScanInput, name: &str, scans: u64) -> anyhow::Error {
     let reason = format!(
         "the map already has {scans} scans of an input with the same beginning ({name}); use `resume` to add the later \
          scans, or `append` `again` to add all scans again"
     );
-    Error::argument(options.scans.display().to_string(), reason).into()
+    Error::argument(input.to_string(), reason).into()
 }
 
 /// Returns the folder for temporary files: the map's folder, or its nearest existing ancestor. The system's temporary
@@ -481,10 +537,10 @@ fn for_reading(bytes: usize) -> usize {
 }
 
 /// Returns the configuration of the map with its memory reduced by the share for reading.
-fn config_of_map(options: &BuildOptions, config: &MapConfig) -> MapConfig {
+fn config_of_map(scans: &ScanInput, config: &MapConfig) -> MapConfig {
     let mut config = config.clone();
     if let Some(bytes) = config.memory_bytes()
-        && !is_standard_input(&options.scans)
+        && !is_standard_input(scans.first())
     {
         let least = MemoryLimit::min_bytes(&config.grid).min(bytes);
         config.memory = MemoryLimit::Bytes((bytes - (for_reading(bytes) - MIN_FOR_READING)).max(least));

@@ -1,44 +1,44 @@
 use crate::build_options::{BuildOptions, SensorModelKind};
 use crate::region_tiles::tiles_of;
-use crate::scan_input::name_of_path;
+use crate::scan_input::ScanInput;
 use voxtile::mapper::{MapReader, MapView};
 use voxtile::sensor::{Iwlo, LogOdds, SensorModel};
-use voxtile::space::{Grid, GridError};
+use voxtile::space::GridError;
 use voxtile::{Error, InsertMode, MapConfig, RayConfig, Storage};
 
-/// Default maximum range of rays.
+/// Default edge of a voxel in metres.
+const RESOLUTION_M: f64 = 0.1;
+/// Default maximum range of rays in metres.
 const MAX_RANGE_M: f64 = 100.0;
 
 /// Returns the parameters of a new map.
 pub fn config_to_create(options: &BuildOptions) -> anyhow::Result<MapConfig> {
-    let (resolution_m, tile_size_m) =
-        (options.resolution_m.unwrap_or(0.1), options.tile_size_m.unwrap_or(10.0));
-    let mut config = MapConfig::new(resolution_m, tile_size_m)
-        .map_err(name_the_option)?
-        .with_storage(options.storage.unwrap_or_default());
+    let resolution_m = options.resolution_m.unwrap_or(RESOLUTION_M);
+    let config = match options.tile_size_m {
+        Some(tile_size_m) => MapConfig::new(resolution_m, tile_size_m),
+        None => MapConfig::with_resolution(resolution_m),
+    };
+    let mut config = config.map_err(name_the_option)?.with_storage(options.storage.unwrap_or_default());
     config.occupancy_threshold = options.occupancy_threshold.unwrap_or(config.occupancy_threshold);
     Ok(for_this_run(options, config, None)?.validated()?)
 }
 
 /// Returns the parameters of an existing map. Given options must agree with them.
-pub fn config_to_go_on(options: &BuildOptions) -> anyhow::Result<MapConfig> {
+pub fn config_to_go_on(options: &BuildOptions, input: &ScanInput) -> anyhow::Result<MapConfig> {
     let map = MapReader::open(&options.output, 0)?;
     let mut config = map.config().clone();
-    if options.resolution_m.is_some() || options.tile_size_m.is_some() {
-        let resolution_m = options.resolution_m.unwrap_or(config.grid.resolution_m());
-        let tile_size_m = options.tile_size_m.unwrap_or(config.grid.tile_size_m());
-        config.grid = Grid::new(resolution_m, tile_size_m).map_err(|error| name_the_option(error.into()))?;
-    }
+    let grid = config.grid.replaced(options.resolution_m, options.tile_size_m);
+    config.grid = grid.map_err(|error| name_the_option(error.into()))?;
     check_storage(options, config.storage)?;
     check_threshold(options, config.occupancy_threshold)?;
-    let begun = options.resume.then(|| rays_begun(options, &map));
+    let begun = options.resume.then(|| rays_begun(input, &map));
     Ok(for_this_run(options, config, begun)?.validated()?)
 }
 
 /// Returns the ray settings of the input to resume. A later input may have changed the map's current ones. Whether it
 /// is the same input is only known once it is read; its settings are compared then.
-fn rays_begun(options: &BuildOptions, map: &MapReader) -> RayConfig {
-    let name = name_of_path(&options.scans);
+fn rays_begun(input: &ScanInput, map: &MapReader) -> RayConfig {
+    let name = input.name_of_paths();
     let inputs = map.metadata().ext.as_ref().map_or(&[][..], |ext| &ext.inputs);
     let input = inputs.iter().rfind(|input| input.is_named(&name)).or(inputs.last());
     input.and_then(|input| input.rays).unwrap_or(map.config().rays)

@@ -19,15 +19,18 @@ pub enum SensorModelKind {
 /// default named here.
 #[derive(Clone, Debug)]
 pub struct BuildOptions {
-    /// Scans: a file, a folder, a URL, a map, or `-` for a scan stream from standard input.
-    pub scans: PathBuf,
+    /// Scans: files, folders, URLs, maps, or `-` alone for a scan stream from standard input. They are mapped in this
+    /// order. Consecutive files of clouds of one format and folder are one input, as the folder would be; any other
+    /// path is an input of its own.
+    pub scans: Vec<PathBuf>,
     /// Settings for reading the scans.
     pub read: ReadOptions,
     /// Folder of the map.
     pub output: PathBuf,
     /// Edge of a voxel in metres. Default: 0.1.
     pub resolution_m: Option<f64>,
-    /// Edge of a tile in metres. Default: 10.
+    /// Edge of a tile in metres. Default: the multiple of the resolution nearest to 10, as
+    /// [`Grid::with_resolution`](voxtile::space::Grid::with_resolution) describes.
     pub tile_size_m: Option<f64>,
     /// Storage format of tiles. Default: OctoMap's.
     pub storage: Option<Storage>,
@@ -84,7 +87,7 @@ impl BuildOptions {
     /// Creates the options for a new map with all defaults.
     pub fn new(scans: impl Into<PathBuf>, output: impl Into<PathBuf>) -> Self {
         Self {
-            scans: scans.into(),
+            scans: vec![scans.into()],
             read: ReadOptions::default(),
             output: output.into(),
             resolution_m: None,

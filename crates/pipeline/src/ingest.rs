@@ -1,7 +1,8 @@
+use crate::scan_input::ScanInput;
 use crate::scan_queue::ScanQueue;
 use crate::scan_reader::{Read, ReadScan, ScanReader};
 use std::collections::{HashSet, VecDeque};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use voxtile::scan::{ScanPoints, ScanTracer};
 use voxtile::sensor::SensorModel;
 use voxtile::space::Grid;
@@ -19,7 +20,7 @@ const MAX_SKIPPED: usize = 10_000;
 /// Sequence of the scans of an input, and the record of the accepted ones for the map.
 pub struct Ingest {
     reader: ScanReader,
-    scans: PathBuf,
+    input: ScanInput,
     /// Scans that were read to identify the input and are not yet inserted.
     lookahead: VecDeque<Read>,
     /// Result of a read that ended a batch of scans and is not a scan itself; returned by the next request.
@@ -60,14 +61,14 @@ pub struct Taken {
 }
 
 impl Ingest {
-    pub fn new(reader: ScanReader, scans: PathBuf, skips_bad: bool, rays: Option<RayNeeds>) -> Self {
+    pub fn new(reader: ScanReader, input: ScanInput, skips_bad: bool, rays: Option<RayNeeds>) -> Self {
         let (lookahead, chain) = (VecDeque::new(), ScanChain::default());
         let (skipped, unread, left_out) = Default::default();
         let (pending, begins_with) = (None, None);
         let (bad_places, skipped_alone) = Default::default();
         Self {
             reader,
-            scans,
+            input,
             lookahead,
             pending,
             chain,
@@ -136,7 +137,7 @@ impl Ingest {
     fn judged(&self, read: Read) -> Read {
         let Some(needs) = &self.rays else { return read };
         match read {
-            Read::Scan(scan) => match needs.check(&scan.scan, self.chain.scans(), &self.scans) {
+            Read::Scan(scan) => match needs.check(&scan.scan, self.chain.scans(), &self.input) {
                 Ok(()) => Read::Scan(scan),
                 Err(error) => Read::Unread(error),
             },
@@ -238,10 +239,7 @@ impl Ingest {
                     return Err(self.wrong(reason));
                 }
                 Read::Scan(_) if was_skipped => {
-                    log::warn!(
-                        "{}: scan {number} was skipped before and remains skipped",
-                        self.scans.display()
-                    );
+                    log::warn!("{}: scan {number} was skipped before and remains skipped", self.input);
                     self.skipped_alone += 1;
                     self.chain.add_unread();
                 }
@@ -358,13 +356,13 @@ impl Ingest {
     }
 
     fn wrong(&self, reason: String) -> anyhow::Error {
-        Error::argument(self.scans.display().to_string(), reason).into()
+        Error::argument(self.input.to_string(), reason).into()
     }
 }
 
 impl RayNeeds {
     /// Checks that a scan can be mapped. `number` is its number in the input.
-    fn check(&self, scan: &StoredScan, number: u64, input: &Path) -> voxtile::Result<()> {
+    fn check(&self, scan: &StoredScan, number: u64, input: &ScanInput) -> voxtile::Result<()> {
         let origin = scan.origin();
         if self.grid.voxel_of(origin).is_none() {
             let StoredScan { name, .. } = scan;
@@ -372,7 +370,7 @@ impl RayNeeds {
                 "the sensor of scan {name} is at {origin:?} m, which is not finite or too far away for a voxel index: \
                  correct its pose, or skip the scan with `skip_bad`"
             );
-            return Err(FormatError::at_record(number, reason).in_input(input));
+            return Err(FormatError::at_record(number, reason).in_input(input.first()));
         }
         self.check_fields(scan)
     }

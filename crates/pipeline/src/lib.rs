@@ -3,11 +3,12 @@
 //!
 //! ```text
 //! BuildOptions -> build                                             build, build_config, flush_schedule
-//!   scans of a file, folder, map, bucket or pipe                    scan_input, kept_source, fetched_source
+//!   scans of files, folders, maps, buckets or a pipe                scan_input, kept_source, fetched_source
 //!   -> ScanReader, in its own thread -> ScanQueue -> Ingest         scan_reader, scan_queue, ingest
 //!   -> a mapper -> Summary                                          summary
 //! ExportOptions -> export -> ExportSummary                          export/, output/
 //! numbers: lists of numbers used by all front ends                  numbers
+//! PolygonFile: an area of GeoJSON                                   polygon_file
 //! Watch: stops work and receives its progress                       watch
 //! ```
 
@@ -21,6 +22,7 @@ mod failed_flush;
 mod fetched_source;
 mod flush_schedule;
 mod ingest;
+mod input_chain;
 mod kept_source;
 mod map_at;
 pub mod memory;
@@ -29,6 +31,7 @@ pub mod numbers;
 pub mod octree_file;
 pub mod output;
 pub mod place;
+mod polygon_file;
 mod pose_check;
 mod region_tiles;
 mod scan_input;
@@ -52,7 +55,8 @@ pub use map_at::{
     whole_map,
 };
 pub use new_poses::{PoseFile, poses_for};
-pub use scan_input::{is_standard_input, open as open_scans};
+pub use polygon_file::PolygonFile;
+pub use scan_input::{ScanInput, ScanInputs, is_standard_input, open_paths};
 pub use scan_place::LocalScans;
 pub use scan_queue::WhenBehind;
 pub use summary::{OctreeWork, Summary};

@@ -1,8 +1,9 @@
 use crate::place::url_of;
 #[cfg(not(feature = "bucket"))]
 use crate::place::without_buckets;
+use crate::scan_input::{ScanInput, ScanInputs};
 use crate::watch::Watch;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use voxtile::Result;
 use voxtile_formats::{ReadOptions, ScanSource};
 
@@ -23,40 +24,55 @@ pub fn scans_at(url: &str, _: &ReadOptions, _: &Watch) -> Result<Box<dyn ScanSou
 
 /// Scans as local files. Fetched files are removed with this value.
 pub struct LocalScans {
-    path: PathBuf,
+    inputs: ScanInputs,
     #[cfg(feature = "bucket")]
-    _fetched: Option<voxtile_bucket::FetchedFiles>,
+    _fetched: Vec<voxtile_bucket::FetchedFiles>,
 }
 
 impl LocalScans {
-    /// Fetches the files at a URL that is not a map, unless it is stopped. Other paths are used unchanged.
+    /// Divides paths into inputs as [`ScanInputs::of`], and fetches the files at URLs that are not maps.
     ///
     /// # Errors
     ///
-    /// The location cannot be read, or [`Error::Stopped`](voxtile::Error::Stopped).
+    /// As for [`ScanInputs::of`] and [`LocalScans::of_inputs`].
+    pub fn of(paths: &[PathBuf], options: &ReadOptions, watch: &Watch) -> Result<Self> {
+        Self::of_inputs(ScanInputs::of(paths, options, watch.stop())?, watch)
+    }
+
+    /// Fetches the files at URLs that are not maps, unless it is stopped. Other inputs are used unchanged.
+    ///
+    /// # Errors
+    ///
+    /// A location cannot be read, or [`Error::Stopped`](voxtile::Error::Stopped).
     #[cfg(feature = "bucket")]
-    pub fn of(scans: &Path, watch: &Watch) -> Result<Self> {
-        let url = match url_of(scans) {
-            Some(url) if !crate::kept_source::is_map(scans, watch.stop())? => Some(url),
-            _ => None,
-        };
-        let fetched = url.map(|url| crate::fetched_source::fetch(url, watch)).transpose()?;
-        let path = fetched.as_ref().map_or(scans, |files| files.path()).to_owned();
-        Ok(Self { path, _fetched: fetched })
+    pub fn of_inputs(mut inputs: ScanInputs, watch: &Watch) -> Result<Self> {
+        let mut fetched = Vec::new();
+        for input in inputs.inputs_mut() {
+            if let Some(url) = url_of(input.first())
+                && !crate::kept_source::is_map(input.first(), watch.stop())?
+            {
+                let files = crate::fetched_source::fetch(url, watch)?;
+                *input = ScanInput::of(files.path());
+                fetched.push(files);
+            }
+        }
+        Ok(Self { inputs, _fetched: fetched })
     }
 
-    /// Uses a path unchanged.
+    /// Uses the inputs unchanged.
     ///
     /// # Errors
     ///
-    /// The path is a URL, and this build does not support buckets.
+    /// A path is a URL, and this build does not support buckets.
     #[cfg(not(feature = "bucket"))]
-    pub fn of(scans: &Path, _: &Watch) -> Result<Self> {
-        url_of(scans).map_or(Ok(Self { path: scans.to_owned() }), |url| Err(without_buckets(url)))
+    pub fn of_inputs(inputs: ScanInputs, _: &Watch) -> Result<Self> {
+        let url = inputs.inputs().iter().find_map(|input: &ScanInput| url_of(input.first()));
+        url.map_or(Ok(()), |url| Err(without_buckets(url)))?;
+        Ok(Self { inputs })
     }
 
-    /// Returns the path of the scans.
-    pub fn path(&self) -> &Path {
-        &self.path
+    /// Returns the inputs on this machine.
+    pub fn inputs(&self) -> &ScanInputs {
+        &self.inputs
     }
 }

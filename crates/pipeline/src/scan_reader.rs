@@ -1,9 +1,8 @@
-use crate::scan_input;
+use crate::scan_input::{ScanInput, ScanInputs};
 use crate::scan_place::LocalScans;
 use crate::scan_queue::{ScanQueue, is_last};
 use crate::watch::Watch;
 use anyhow::bail;
-use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::thread;
@@ -83,7 +82,7 @@ enum Answer {
 impl ScanReader {
     /// Opens an input. Returns `None` if it was stopped before.
     pub fn open(
-        scans: PathBuf,
+        scans: ScanInput,
         options: ReadOptions,
         budget: PointBudget,
         fingerprint: FingerprintFn,
@@ -91,14 +90,14 @@ impl ScanReader {
     ) -> anyhow::Result<Option<(Self, Opened)>> {
         let (requests, requests_in) = channel();
         let (answers_out, answers) = channel();
-        let local = match LocalScans::of(&scans, &watch) {
+        let local = match LocalScans::of_inputs(ScanInputs::from(scans.clone()), &watch) {
             Err(Error::Stopped) => return Ok(None),
             local => local?,
         };
-        let (path, own_options, here) = (local.path().to_owned(), options.clone(), budget.clone());
+        let (inputs, own_options, here) = (local.inputs().clone(), options.clone(), budget.clone());
         let (named, own_watch, stop) = (scans.clone(), watch.clone(), watch.stop().clone());
         let read = move || {
-            let mut source = match scan_input::open(&path, &own_options, &own_watch) {
+            let mut source = match inputs.open(&own_options, &own_watch) {
                 Ok(source) => source,
                 Err(error) => return drop(answers_out.send(Answer::Opened(Err(error)))),
             };
@@ -129,7 +128,7 @@ impl ScanReader {
                     "cannot start a thread for reading, so stop requests take effect only when the input \
                             responds: {error}"
                 );
-                let source = scan_input::open(local.path(), &options, &watch)?;
+                let source = local.inputs().open(&options, &watch)?;
                 let opened = Opened::of(&scans, &*source);
                 Ok(Some((
                     Self {
@@ -239,8 +238,8 @@ impl Drop for ScanReader {
 }
 
 impl Opened {
-    fn of(scans: &std::path::Path, source: &dyn ScanSource) -> Self {
-        let name = scan_input::name_of(scans, source);
+    fn of(scans: &ScanInput, source: &dyn ScanSource) -> Self {
+        let name = scans.name(source);
         Self { name, scans: source.len_hint(), poses: source.pose_source() }
     }
 }

@@ -1,5 +1,6 @@
 use crate::memory;
-use serde::Serialize;
+use serde::ser::SerializeMap;
+use serde::{Serialize, Serializer};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 use voxtile::OctreeConfig;
@@ -34,8 +35,8 @@ pub struct Summary {
     pub left_out: u64,
     /// Further remarks for the user.
     pub remarks: Vec<String>,
-    /// Grid of voxels and tiles.
-    #[serde(skip)]
+    /// Grid of voxels and tiles; serialized as `resolution_m` and `tile_size_m`.
+    #[serde(flatten, serialize_with = "lengths")]
     pub grid: Grid,
     /// Statistics of points and rays.
     #[serde(flatten)]
@@ -71,6 +72,13 @@ pub struct Summary {
     pub seconds: f64,
     /// Peak resident memory of the process.
     pub peak_rss_bytes: Option<u64>,
+}
+
+fn lengths<S: Serializer>(grid: &Grid, serializer: S) -> Result<S::Ok, S::Error> {
+    let mut lengths = serializer.serialize_map(Some(2))?;
+    lengths.serialize_entry("resolution_m", &grid.resolution_m())?;
+    lengths.serialize_entry("tile_size_m", &grid.tile_size_m())?;
+    lengths.end()
 }
 
 /// Statistics of pointer octrees, from the start to the last flush.
@@ -128,6 +136,42 @@ impl Summary {
             seconds: elapsed.as_secs_f64(),
             peak_rss_bytes: memory::peak_bytes(),
         })
+    }
+}
+
+impl Summary {
+    /// Returns the summary of two runs of one command. Sizes and states are those of the later one.
+    pub(crate) fn after(mut self, earlier: Self) -> Self {
+        self.scans += earlier.scans;
+        self.resumed_after += earlier.resumed_after;
+        self.left_out += earlier.left_out;
+        self.report += earlier.report;
+        self.loads += earlier.loads;
+        self.saves += earlier.saves;
+        let (io, before) = (&mut self.io, earlier.io);
+        io.loads += before.loads;
+        io.prefetches += before.prefetches;
+        io.saves += before.saves;
+        io.encoded += before.encoded;
+        io.decoded += before.decoded;
+        io.hits += before.hits;
+        io.bytes_read += before.bytes_read;
+        io.bytes_written += before.bytes_written;
+        // Percentiles of both cannot be computed: those of the run that waited more are reported.
+        let stalls = [earlier.stalls, self.stalls];
+        let most = if stalls[0].count > stalls[1].count { stalls[0] } else { stalls[1] };
+        self.stalls = most;
+        self.stalls.count = stalls[0].count + stalls[1].count;
+        self.stalls.worst_us = stalls[0].worst_us.max(stalls[1].worst_us);
+        self.poses = match (earlier.poses, self.poses) {
+            (Some(first), Some(next)) if !first.split(", ").any(|known| known == next) => {
+                Some(format!("{first}, {next}"))
+            }
+            (first, next) => first.or(next),
+        };
+        self.unread.splice(0..0, earlier.unread);
+        self.remarks.splice(0..0, earlier.remarks);
+        self
     }
 }
 

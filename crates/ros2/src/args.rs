@@ -58,9 +58,9 @@ pub struct Args {
     /// Voxel size of a new map
     #[arg(long, value_name = "M", default_value_t = 0.05)]
     pub resolution: f64,
-    /// Tile size of a new map
-    #[arg(long, value_name = "M", default_value_t = 10.0)]
-    pub tile_size: f64,
+    /// Tile size of a new map [default: the multiple of the resolution nearest to 10]
+    #[arg(long, value_name = "M")]
+    pub tile_size: Option<f64>,
     /// Ignore points nearer than this
     #[arg(long, value_name = "M", default_value_t = 0.0)]
     pub min_range: f64,

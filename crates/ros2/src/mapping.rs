@@ -94,7 +94,10 @@ impl Mapping {
                 OutOfCoreTileMapper::open(&args.output, own(config))?
             }
             Err(Error::NoMap { .. }) => {
-                let config = MapConfig::new(args.resolution, args.tile_size)?;
+                let config = match args.tile_size {
+                    Some(tile_size_m) => MapConfig::new(args.resolution, tile_size_m)?,
+                    None => MapConfig::with_resolution(args.resolution)?,
+                };
                 let config = config.with_sensor_model(args.sensor_model()?);
                 let config = config.with_clearing(args.clearing.map(Clearing::from));
                 let config = config.with_kept_scans(args.keep_scans || is_followed);

@@ -24,6 +24,7 @@ __all__ = [
     "count_scans",
     "crop",
     "decay",
+    "default_tile_size",
     "delete_snapshot",
     "describe",
     "diff",
@@ -46,6 +47,7 @@ __all__ = [
 ]
 
 _Path: TypeAlias = str | PathLike[str]
+_Paths: TypeAlias = _Path | Sequence[_Path]
 _MapOrSnapshot: TypeAlias = _Path | tuple[_Path, str]
 _Progress: TypeAlias = Callable[[int, int], object]
 _Pose: TypeAlias = ArrayLike | tuple[ArrayLike, ArrayLike]
@@ -120,7 +122,7 @@ class Map:
         path: _Path,
         resolution: float = 0.1,
         *,
-        tile_size: float = 10.0,
+        tile_size: float | None = None,
         min_range: float = 0.0,
         max_range: float | None = None,
         insert_mode: _InsertMode = "per-scan",
@@ -223,13 +225,13 @@ class ScanIterator:
     @property
     def moving(self) -> NDArray[np.bool_] | None: ...
 
-def count_scans(path: _Path, options: Mapping[str, Any]) -> int: ...
-def open_scans(path: _Path, options: Mapping[str, Any]) -> ScanIterator: ...
+def count_scans(path: _Paths, options: Mapping[str, Any]) -> int: ...
+def open_scans(path: _Paths, options: Mapping[str, Any]) -> ScanIterator: ...
 def scan_reaches(
-    path: _Path, options: Mapping[str, Any], *, max_range: float | None = None, no_return_range: float | None = None
+    path: _Paths, options: Mapping[str, Any], *, max_range: float | None = None, no_return_range: float | None = None
 ) -> list[tuple[str, tuple[float, float, float, float] | None]]: ...
 def call_build(
-    scans: _Path,
+    scans: _Paths,
     output: _Path,
     options: Mapping[str, Any],
     progress: _Progress | None = None,
@@ -319,12 +321,15 @@ def join(shards: Sequence[_Path], output: _Path, *, progress: _Progress | None =
 def replace_tiles(
     map: _Path, parts: Sequence[_Path], *, of_flush: int, scans: int, progress: _Progress | None = None
 ) -> dict[str, Any]: ...
+def default_tile_size(resolution: float) -> float: ...
 def describe(map: _MapOrSnapshot) -> dict[str, Any]: ...
 def crop(
     map: _MapOrSnapshot,
     output: _Path,
-    region: ArrayLike,
+    region: ArrayLike | None = None,
     *,
+    polygon: _Path | None = None,
+    z: tuple[float, float] | None = None,
     outside: bool = False,
     shard_of: str | None = None,
     progress: _Progress | None = None,

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from typing_extensions import Unpack
 
 _Path = str | os.PathLike[str]
+_Paths = _Path | Sequence[_Path]
 _Corners = Sequence[float] | Sequence[Sequence[float]]
 
 
@@ -85,7 +86,7 @@ class ExportOptions(TypedDict, total=False):
     """Options of ``voxtile export``. Lengths are in metres.
 
     ``format`` is needed if the extension of the output does not name it: ply pcd csv bt ot xyz npz las laz copc e57
-    parquet mcap glb nav2 heightmap autoware 3dtiles.
+    parquet mcap glb nav2 heightmap geotiff autoware 3dtiles.
     """
 
     format: str | None
@@ -100,8 +101,10 @@ class ExportOptions(TypedDict, total=False):
     memory: int | str
 
 
-def scans(path: _Path, **options: Unpack[ReadOptions]) -> ScanIterator:
+def scans(path: _Paths, **options: Unpack[ReadOptions]) -> ScanIterator:
     """Iterates over the scans of a file or folder, in any format of the command, or over those that a map keeps.
+
+    With a list of paths, the scans of all of them follow each other.
 
     A scan is a tuple of points in the sensor's frame (``float64``, N x 3), the pose (4 x 4) and intensities
     (``float32``, or ``None``). ``ReadOptions`` lists the keywords. After each scan, ``moving`` of the iterator has the
@@ -110,7 +113,7 @@ def scans(path: _Path, **options: Unpack[ReadOptions]) -> ScanIterator:
     return open_scans(path, options)
 
 
-def count_scans(path: _Path, **options: Unpack[ReadOptions]) -> int:
+def count_scans(path: _Paths, **options: Unpack[ReadOptions]) -> int:
     """Counts the scans of a file or folder. Reads the whole input if it stores no number of scans; ``.scans`` files are
     counted without decoding the scans.
     """
@@ -118,7 +121,7 @@ def count_scans(path: _Path, **options: Unpack[ReadOptions]) -> int:
 
 
 def reaches(
-    path: _Path,
+    path: _Paths,
     *,
     max_range: float | None = None,
     clear_no_return: float | None = None,
@@ -137,13 +140,14 @@ def build_shard(path: _Path, output: _Path, map_id: str, **options: Unpack[Build
 
 
 def build(
-    path: _Path,
+    path: _Paths,
     output: _Path,
     *,
     progress: Callable[[int, int], object] | None = None,
     **options: Unpack[BuildOptions],
 ) -> dict[str, Any]:
-    """Makes a map of a file or folder of scans, or adds them to one, as ``voxtile build`` does.
+    """Makes a map of a file or folder of scans, or of a list of them in this order, or adds them to one, as
+    ``voxtile build`` does.
 
     ``BuildOptions`` lists the keywords. ``progress`` is called with two numbers: the scans done and all scans, 0 if
     their number is unknown. Returns what the command prints with ``--json``; its remarks are warnings, too. If it is

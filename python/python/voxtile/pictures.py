@@ -52,12 +52,13 @@ def heights(
 def plot(map: Map, *, region: Any = None, min_probability: float | None = None, ax: Axes | None = None) -> Figure:
     """Draws the map from above: the height of the highest occupied voxel of each column, in metres.
 
-    ``region`` is a box, lower and upper corner; ``ax`` are axes to draw into. Needs matplotlib.
+    ``region`` is a box, lower and upper corner; ``ax`` are axes to draw into. Needs matplotlib. Returns the figure. A
+    notebook shows it as the result of a cell, or with ``display``; in a program, ``savefig`` writes it.
     """
-    from matplotlib.figure import Figure as NewFigure
+    from .notebook_figure import NotebookFigure
 
     values, extent = heights(map, region, min_probability)
-    figure = NewFigure(figsize=(8, 6)) if ax is None else ax.figure
+    figure = NotebookFigure(figsize=(8, 6)) if ax is None else ax.figure
     axes = figure.add_subplot() if ax is None else ax
     image = axes.imshow(values, origin="lower", extent=extent, interpolation="nearest", cmap="viridis")
     axes.set_xlabel("x in m")
@@ -83,6 +84,7 @@ def summary_html(map: Map) -> str:
 
 def _picture_html(map: Map) -> str:
     try:
+        from matplotlib import colormaps
         from matplotlib.image import imsave
     except ImportError:
         return ""
@@ -90,7 +92,8 @@ def _picture_html(map: Map) -> str:
     if np.isnan(values).all():
         return ""
     png = io.BytesIO()
-    imsave(png, values, origin="lower", format="png")
+    # Unknown columns are white: on a dark page, a transparent background would hide the shape of the map.
+    imsave(png, values, origin="lower", format="png", cmap=colormaps["viridis"].with_extremes(bad="white"))
     return f'<img alt="from above" src="data:image/png;base64,{base64.b64encode(png.getvalue()).decode()}">'
 
 

@@ -2,8 +2,8 @@ use super::random_maps::{config, disk, open, path, random_voxels, read_map, writ
 use testkit::random_scans::Random;
 use testkit::reference_map::Voxels;
 use voxtile::mapper::MapView;
-use voxtile::operations::{Part, Prefer, clear, crop, merge};
-use voxtile::space::Aabb;
+use voxtile::operations::{AreaPart, Part, Prefer, clear, crop, crop_area, merge};
+use voxtile::space::{Aabb, Area, VoxelBox};
 use voxtile::{Error, MapConfig, MapPath, MapQueries, MapReader};
 
 /// A random box around the voxels of [`random_voxels`]: bounds between voxels, on their borders and centers, and beyond
@@ -124,4 +124,60 @@ fn a_map_cannot_be_created_inside_another() {
         assert!(matches!(refused, Err(Error::InvalidArgument { .. })), "{inside}: {refused:?}");
     }
     assert_eq!(disk.files(), before);
+}
+
+/// A prism around the voxels of [`random_voxels`], with a hole.
+fn random_prism(random: &mut Random) -> AreaPart {
+    let mut corner = || [random.between(-6.0, 6.0), 1.5 + random.between(-6.0, 6.0)];
+    let triangle = [corner(), corner(), corner()].to_vec();
+    let hole = [corner(), corner(), corner()].to_vec();
+    let z_m = match random.below(3) {
+        0 => [f64::NEG_INFINITY, f64::INFINITY],
+        1 => [-1.125, 0.75],
+        _ => [random.between(-4.0, -1.0), f64::INFINITY],
+    };
+    AreaPart { area: Area::new(&[vec![triangle, hole]]).unwrap(), z_m, is_outside: random.below(2) == 1 }
+}
+
+#[test]
+fn crops_by_areas_are_filters() {
+    let (mut cut_through, mut empty) = (0, 0);
+    for seed in 0..40 {
+        let mut random = Random(seed);
+        let (disk, config) = (disk(), config(&mut random));
+        let voxels = random_voxels(&mut random, 400);
+        write_map(&disk, &path("whole"), &config, &voxels);
+        let part = random_prism(&mut random);
+        let is_in = |voxel: [i32; 3]| {
+            let alone = VoxelBox { min: voxel, end: voxel.map(|index| index + 1) };
+            let [_, _, z] = config.grid.center_m(voxel);
+            let is_in_prism =
+                part.area.columns(&config.grid, &alone).is_full() && part.z_m[0] <= z && z < part.z_m[1];
+            is_in_prism != part.is_outside
+        };
+        let expected: Voxels = voxels
+            .iter()
+            .filter(|(voxel, _)| is_in(**voxel))
+            .map(|(&voxel, &found)| (voxel, found))
+            .collect();
+        let written =
+            crop_area(&open(&disk, &path("whole")).unwrap(), &part, path("part"), |_, _| {}).unwrap();
+        assert_eq!(read_map(&disk, &path("part")), expected, "seed {seed}");
+        assert_eq!(written.voxels, expected.len() as u64);
+        cut_through += u64::from(!expected.is_empty() && expected.len() < voxels.len());
+        empty += u64::from(expected.is_empty());
+    }
+    assert!(cut_through > 10 && empty > 2, "{cut_through} {empty}");
+}
+
+#[test]
+fn areas_without_a_height_of_a_voxel_are_refused() {
+    let mut random = Random(1);
+    let (disk, config) = (disk(), config(&mut random));
+    write_map(&disk, &path("whole"), &config, &random_voxels(&mut random, 10));
+    for z_m in [[1.0, 1.0], [2.0, 1.0], [f64::NAN, 1.0], [0.0, f64::NAN]] {
+        let part = AreaPart { z_m, is_outside: false, ..random_prism(&mut random) };
+        let refused = crop_area(&open(&disk, &path("whole")).unwrap(), &part, path("none"), |_, _| {});
+        assert!(matches!(refused, Err(Error::InvalidArgument { .. })), "{z_m:?}");
+    }
 }

@@ -8,14 +8,15 @@ use voxtile_pipeline::{FlushEvery, WhenBehind};
 #[derive(Debug, Args)]
 #[command(allow_negative_numbers = true)]
 pub struct BuildArgs {
-    #[arg(value_name = "SCANS", help = help::SCANS_OR_MAP)]
-    pub scans: PathBuf,
+    #[arg(value_name = "SCANS", required = true, help = help::SCANS_OR_MAP)]
+    pub scans: Vec<PathBuf>,
     #[arg(short = 'o', long = "output", value_name = "MAP", help = help::MAP)]
     pub output: PathBuf,
     /// Edge length of a voxel, in metres [default: 0.1, or the map's]
     #[arg(long, value_name = "M")]
     pub resolution: Option<f64>,
-    /// Edge length of a tile, in metres, 2 to 1024 whole voxels [default: 10, or the map's]
+    /// Edge length of a tile, in metres, 2 to 1024 whole voxels [default: the multiple of the resolution nearest to 10,
+    /// of at most 256 voxels (0.15: 10.05), or the map's]
     #[arg(long, value_name = "M")]
     pub tile_size: Option<f64>,
     /// Storage format of the tiles of a new map; `voxtile convert` changes it later [default: octomap, or the map's]

@@ -43,8 +43,21 @@ impl From<PreferName> for Prefer {
 pub struct CropArgs {
     #[arg(help = help::MAP_OR_SNAPSHOT)]
     pub map: PathBuf,
-    #[command(flatten)]
-    pub part: PartArgs,
+    /// Box of voxels by their centers (X0 <= x < X1, same for y and z), in metres
+    #[arg(long, value_names = ["X0", "Y0", "Z0", "X1", "Y1", "Z1"], num_args = 6,
+        required_unless_present = "polygon")]
+    pub region: Option<Vec<f64>>,
+    /// Voxels with their center in the polygons of a GeoJSON file, in the map's coordinates: even-odd in each polygon
+    /// with its holes; of the edges, the lower and left ones are included
+    #[arg(long, value_name = "FILE", conflicts_with = "region")]
+    pub polygon: Option<PathBuf>,
+    /// With --polygon: range of heights of the centers (MIN <= z < MAX), in metres; -inf and inf are allowed [default:
+    /// all]
+    #[arg(long, value_names = ["MIN", "MAX"], num_args = 2, allow_hyphen_values = true, requires = "polygon")]
+    pub z: Option<Vec<f64>>,
+    /// Select all other voxels instead
+    #[arg(long)]
+    pub outside: bool,
     #[arg(short = 'o', long = "output", value_name = "MAP", help = help::NEW_MAP)]
     pub output: PathBuf,
     #[arg(long, help = help::JSON)]

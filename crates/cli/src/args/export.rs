@@ -11,7 +11,7 @@ pub struct ExportArgs {
     #[arg(help = help::ANY_MAP)]
     pub map: PathBuf,
     /// File to write. The extension selects the format: .ply .pcd .csv .xyz .npz .las .laz .copc.laz .e57 .parquet
-    /// .mcap voxels, .glb their surface, .pgm a 2D occupancy grid for nav2, .png heights, .bt .ot the octree. - is
+    /// .mcap voxels, .glb their surface, .pgm a 2D occupancy grid for nav2, .png .tif heights, .bt .ot the octree. - is
     /// standard output (.ply .pcd .csv .bt .ot)
     #[arg(
         short = 'o',
@@ -38,10 +38,10 @@ pub struct ExportArgs {
     /// Voxels to export [default: occupied; all for .pgm]
     #[arg(long, value_name = "WHICH", conflicts_with = "min_probability")]
     pub what: Option<WhatName>,
-    /// .pgm, .png: only voxels that reach above this height, in metres
+    /// .pgm, .png, .tif: only voxels that reach above this height, in metres
     #[arg(long, value_name = "M")]
     pub z_min: Option<f64>,
-    /// .pgm, .png: only voxels that reach below this height, in metres
+    /// .pgm, .png, .tif: only voxels that reach below this height, in metres
     #[arg(long, value_name = "M")]
     pub z_max: Option<f64>,
     /// autoware: edge length of a square, one file each, in whole metres [default: 20]

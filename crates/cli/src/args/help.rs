@@ -28,7 +28,8 @@ macro_rules! scans {
              with a subfolder scans/; a recording (.bag .mcap .db3, rosbag2 folder); a file (.laz .e57 .xyz ...); OctoMap's \
              .graph or .log; ",
             $more,
-            "a scan stream (.scans, or - for standard input)"
+            "a scan stream (.scans, or - for standard input). Several are read in this order; neighbouring files of \
+             clouds of one format and folder are one input, as the folder would be"
         )
     };
 }

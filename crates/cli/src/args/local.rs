@@ -5,8 +5,8 @@ use std::path::PathBuf;
 #[derive(Debug, Args)]
 #[command(allow_negative_numbers = true)]
 pub struct LocalArgs {
-    #[arg(value_name = "SCANS", help = help::SCANS)]
-    pub scans: PathBuf,
+    #[arg(value_name = "SCANS", required = true, help = help::SCANS)]
+    pub scans: Vec<PathBuf>,
     /// Parameter set for the use of the map
     #[arg(long, value_name = "NAME", default_value = "local")]
     pub preset: PresetName,

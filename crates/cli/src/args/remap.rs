@@ -51,7 +51,8 @@ pub struct RemapArgs {
     /// With -o: edge length of a voxel, in metres [default: the map's]
     #[arg(long, value_name = "M", requires = "output")]
     pub resolution: Option<f64>,
-    /// With -o: edge length of a tile, in metres [default: the map's]
+    /// With -o: edge length of a tile, in metres [default: the map's; as of `voxtile build` if that does not fit the
+    /// resolution]
     #[arg(long, value_name = "M", requires = "output")]
     pub tile_size: Option<f64>,
     /// With -o: skip points nearer to the sensor than this, in metres [default: as each scan was mapped]

@@ -269,11 +269,20 @@ fn bad_inputs_print_one_line_with_a_remedy() {
             "the largest intensity must be above the intensity threshold",
         ),
         (
-            vec!["build", scans, "-o", new, "--resolution", "0.3"],
+            vec!["build", scans, "-o", new, "--resolution", "0.3", "--tile-size", "10"],
             2,
             "add --tile-size 9.9 or --tile-size 10.2",
         ),
-        (vec!["build", scans, "-o", new, "--resolution", "7"], 2, "add --tile-size 14, or choose another"),
+        (
+            vec!["build", scans, "-o", new, "--resolution", "7", "--tile-size", "10"],
+            2,
+            "add --tile-size 14, or choose another",
+        ),
+        (
+            vec!["build", scans, "-o", map, "--append", "--resolution", "0.15"],
+            2,
+            "resolution 0.1 m, not 0.15 m",
+        ),
         (vec!["build", scans, "-o", &plain], 2, "is a file, but a map is a folder"),
         (
             vec!["build", scans, "-o", map, "--append"],
@@ -456,6 +465,37 @@ fn octomap_files_are_described_and_exported_and_a_bomb_is_refused() {
     fs::write(&pointer, "version https://git-lfs.github.com/spec/v1\noid sha256:00\nsize 5\n").unwrap();
     let (_, stderr) = failure(&["info", text(&pointer)]);
     assert!(stderr.contains("pointer.bt: is a Git LFS pointer, not the file itself"), "{stderr}");
+}
+
+#[test]
+fn a_map_of_any_resolution_has_tiles_of_nearly_10_m() {
+    let folder = TempDir::new().unwrap();
+    let scans = scans(&folder);
+    let expected = [("0.15", 10.05), ("0.3", 9.9), ("7", 14.0), ("25", 50.0), ("0.001", 0.256)];
+    for (resolution, tile_m) in expected {
+        let map = folder.path().join(resolution);
+        // Rays of 4000 voxels are not needed to see the tiles.
+        let build = ["build", text(&scans), "-o", text(&map), "--resolution", resolution, "--max-range", "1"];
+        let built = json(&[&build[..], &["--json", "--no-rays"]].concat());
+        assert_eq!(built["resolution_m"].as_f64().unwrap().to_string(), resolution);
+        assert_eq!(built["tile_size_m"], tile_m);
+        let info = json(&["info", text(&map), "--json"]);
+        assert_eq!(info["tile_size_m"], tile_m);
+    }
+    let digest = |name: &str, options: &[&str]| {
+        let map = folder.path().join(name);
+        output(&[&["build", text(&scans), "-o", text(&map)][..], options].concat());
+        output(&["digest", text(&map)]).split(' ').next().unwrap().to_owned()
+    };
+    assert_eq!(digest("default", &[]), digest("given", &["--resolution", "0.1", "--tile-size", "10"]));
+    let found = digest("found", &["--resolution", "0.15"]);
+    assert_eq!(found, digest("same", &["--resolution", "0.15", "--tile-size", "10.05"]));
+    // Its scans can be added without the options, and with the same resolution.
+    let map = folder.path().join("found");
+    for same in [&[][..], &["--resolution", "0.15"]] {
+        let again = ["build", text(&scans), "-o", text(&map), "--append", "--again"];
+        assert!(output(&[&again[..], same].concat()).contains("of 10.05 m"));
+    }
 }
 
 #[test]

@@ -550,7 +550,7 @@ fn decayed_free_voxels_stay_free_in_files_from_above() {
     let folder = TempDir::new().unwrap();
     let map = near_map(&folder);
     let files = |when: &str| {
-        ["pgm", "png", "glb"].map(|extension| {
+        ["pgm", "png", "glb", "tif"].map(|extension| {
             // The name is the same before and after, because a file next to the picture contains it.
             let out = folder.path().join(when);
             fs::create_dir_all(&out).unwrap();
@@ -564,7 +564,7 @@ fn decayed_free_voxels_stay_free_in_files_from_above() {
     assert!(picture.contains(&254) && picture.contains(&0), "free and occupied columns");
     output(&["decay", text(&map), "--halflife", "0.001"]);
     let faded = files("faded");
-    for (number, name) in ["pgm", "png", "glb"].into_iter().enumerate() {
+    for (number, name) in ["pgm", "png", "glb", "tif"].into_iter().enumerate() {
         assert!(faded[number] == before[number], "{name}");
     }
 }

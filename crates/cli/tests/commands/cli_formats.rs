@@ -95,17 +95,38 @@ fn recordings_of_either_ros_make_the_same_map() {
     assert!(!map.exists());
 }
 
-/// The shell expands `drive_*.bag` to several arguments.
+/// The shell expands `drive_*.bag` to several arguments. Parts of a recording are one input, others are several.
+#[cfg(feature = "ros")]
 #[test]
-fn several_files_for_one_input_give_a_hint() {
+fn recordings_in_several_files_are_mapped_together() {
     let folder = TempDir::new().unwrap();
-    let parts = ["0.bag", "1.bag"].map(|name| folder.path().join(name));
-    parts.iter().for_each(|part| fs::write(part, "").unwrap());
     let map = folder.path().join("map");
-    let refused = refusal(&["build", text(&parts[0]), text(&parts[1]), "-o", text(&map)]);
-    assert!(refused.contains("an input is one file or folder: give the folder"), "{refused}");
-    let refused = refusal(&["build", text(&parts[0]), "gone.bag", "-o", text(&map)]);
-    assert!(refused.contains("gone.bag") && !refused.contains("give the folder"), "{refused}");
+    let copy = |from: &str, to: &str| {
+        let path = folder.path().join(to);
+        fs::copy(repository(&format!("crates/formats/tests/data/ros/{from}")), &path).unwrap();
+        path
+    };
+    let build = |inputs: [&Path; 2]| {
+        let [first, second] = inputs.map(text);
+        output(&["build", first, second, "-o", text(&map), "--topic", "/points"]);
+        let info: serde_json::Value = serde_json::from_str(&output(&["info", text(&map), "--json"])).unwrap();
+        fs::remove_dir_all(&map).unwrap();
+        let names = info["inputs"].as_array().unwrap().iter();
+        let names: Vec<String> = names.map(|input| input["name"].as_str().unwrap().to_owned()).collect();
+        (info["scan_number"].as_u64().unwrap(), names.join(", "))
+    };
+    let parts = ["drive_0.bag", "drive_1.bag"].map(|name| copy("none.bag", name));
+    // The order of the parts is that of their numbers.
+    assert_eq!(build([&parts[1], &parts[0]]), (8, "drive_0.bag and other files".to_owned()));
+    let (first, other) = (copy("none.bag", "first.bag"), copy("none.mcap", "other.mcap"));
+    // The same clouds again, in another file.
+    let twice = ["build", text(&first), text(&other), "-o", text(&map), "--topic", "/points"];
+    let refused = refusal(&twice);
+    assert!(refused.contains("other.mcap: the map already has 4 scans"), "{refused}");
+    fs::remove_dir_all(&map).unwrap();
+    let log = folder.path().join("walk.log");
+    fs::write(&log, "NODE 1 1 1 0 0 0\n1 2 3\n").unwrap();
+    assert_eq!(build([&first, &log]), (5, "first.bag, walk.log".to_owned()));
 }
 
 /// A renamed copy is still recognised as a recording, without an option.

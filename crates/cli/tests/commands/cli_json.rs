@@ -116,7 +116,8 @@ fn a_failure_prints_an_object_and_a_line() {
 
     let (code, error, _) = failed(&["build", text(&scans), "-o", map, "--json"]);
     assert_eq!((code, &error["kind"], &error["path"]), (2, &"already_exists".into(), &map.into()));
-    let (code, error, _) = failed(&["build", text(&scans), "-o", none, "--resolution", "0.3", "--json"]);
+    let misfit = ["build", text(&scans), "-o", none, "--resolution", "0.3", "--tile-size", "10", "--json"];
+    let (code, error, _) = failed(&misfit);
     assert_eq!((code, &error["kind"]), (2, &"grid".into()));
 
     let scan = scans.join("001.pcd");

@@ -242,6 +242,20 @@ fn another_map_keeps_the_region_for_any_tile_size() {
 }
 
 #[test]
+fn another_map_of_any_resolution_has_tiles_that_fit() {
+    let kept = Kept::new();
+    for (resolution, tile_m) in [("0.25", 1.0), ("0.15", 10.05)] {
+        let (found, wanted) = (kept.path(&format!("found {resolution}")), kept.path(resolution));
+        output(&["remap", &kept.map, "-o", &found, "--resolution", resolution]);
+        assert_eq!(json(&["info", &found, "--json"])["tile_size_m"], tile_m);
+        let tile = tile_m.to_string();
+        let build = ["build", text(&kept.scans), "-o", &wanted, "--resolution", resolution];
+        output(&[&build[..], &["--tile-size", &tile]].concat());
+        assert_eq!(digest(&found), digest(&wanted));
+    }
+}
+
+#[test]
 fn a_damaged_segment_is_named_and_repaired_around() {
     let kept = Kept::new();
     let segment = Path::new(&kept.map).join("kept_scans/segment.1");

@@ -22,6 +22,8 @@ mod cli_local;
 mod cli_log;
 /// Pictures and reports.
 mod cli_pictures;
+/// Crops by polygons of GeoJSON files.
+mod cli_polygon;
 /// Ambiguous poses.
 mod cli_pose_guess;
 /// Poses in an input, next to it, or given by an option.
@@ -32,6 +34,8 @@ mod cli_region;
 mod cli_remap;
 /// Scan streams from standard input.
 mod cli_scan_stream;
+/// Several inputs in one command.
+mod cli_several_inputs;
 /// Snapshots.
 mod cli_snapshots;
 /// Recordings with damaged chunks.

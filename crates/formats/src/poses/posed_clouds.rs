@@ -26,6 +26,8 @@ pub struct CloudOptions {
     pub is_deskewed: bool,
     /// A cloud without a pose is in the world frame. Only valid for points without rays.
     pub may_lack_poses: bool,
+    /// The pose file is that of several inputs, so its poses cannot be matched by the number of a cloud.
+    pub are_poses_shared: bool,
     /// Whether clouds without a pose cause a remark.
     pub are_poses_needed: bool,
     /// Points without a return are kept as rays: [`RayConfig::no_return_range_m`](voxtile::RayConfig).
@@ -47,6 +49,7 @@ impl Default for CloudOptions {
             is_world_frame: false,
             is_deskewed: false,
             may_lack_poses: false,
+            are_poses_shared: false,
             are_poses_needed: true,
             has_no_returns: false,
         }
@@ -111,6 +114,14 @@ impl PosedClouds {
         if let CloudPoses::File(trajectory) = &poses
             && !trajectory.has_stamps()
         {
+            if options.are_poses_shared {
+                let reason = format!(
+                    "{}: these poses are matched with the clouds by number, and there are several inputs: give poses \
+                     with time stamps for clouds with time stamps, or one input after the other with `append`",
+                    trajectory.path().display()
+                );
+                return Err(Error::argument("poses", reason));
+            }
             trajectory.check_clouds(&*source)?;
         }
         let (number, without_pose, is_at_end, has_pose, reasons, fields) = Default::default();

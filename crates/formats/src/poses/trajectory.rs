@@ -318,7 +318,7 @@ impl Trajectory {
         };
         let reason = format!(
             "{} poses for {clouds}, and not both have time stamps: there must be one pose per cloud, in the same order \
-             (files in natural order, scan2 before scan10){names}",
+             (files of a folder in natural order, scan2 before scan10){names}",
             self.len()
         );
         Error::argument(self.path.display().to_string(), reason)

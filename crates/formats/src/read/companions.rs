@@ -122,7 +122,7 @@ const FEW_ROWS: usize = 4;
 const MIN_STAMP: f64 = 1e8;
 
 /// Returns whether the name alone shows that a file is not a cloud.
-pub(super) fn is_surely_named(path: &Path) -> bool {
+pub(crate) fn is_surely_named(path: &Path) -> bool {
     NAMES.contains(&stem_of(path).as_str())
 }
 

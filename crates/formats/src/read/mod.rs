@@ -7,7 +7,7 @@ pub(crate) mod bin;
 mod bin_columns;
 pub(crate) mod cloud;
 mod columns;
-mod companions;
+pub(crate) mod companions;
 #[cfg(any(feature = "las", feature = "e57"))]
 mod crs_unit;
 pub(crate) mod depth;
@@ -20,7 +20,7 @@ pub(crate) mod e57;
 mod e57_packets;
 #[cfg(feature = "e57")]
 mod e57_pages;
-mod file_order;
+pub(crate) mod file_order;
 pub(crate) mod files;
 pub(crate) mod foreign;
 pub(crate) mod from_origin;

@@ -35,6 +35,16 @@ pub(crate) fn open(path: &Path, options: &ReadOptions) -> Result<Box<dyn ScanSou
     if files.is_empty() {
         return Err(Error::argument(path.display().to_string(), "no file in it ends with .pcd"));
     }
+    open_files(path, files, None, options)
+}
+
+/// Opens PCD files in the given order. `path` is the only file or a folder, where a pose file is searched for.
+pub(crate) fn open_files(
+    path: &Path,
+    files: Vec<PathBuf>,
+    remark: Option<String>,
+    options: &ReadOptions,
+) -> Result<Box<dyn ScanSource + Send>> {
     let is_plain = options.calib.is_none() && options.clouds.is_plain() && options.sensor_origin_m.is_none();
     let stamps = NameStamps::of(&files);
     let mut poses = poses_of(path, &files, is_plain, options)?;
@@ -64,7 +74,7 @@ pub(crate) fn open(path: &Path, options: &ReadOptions) -> Result<Box<dyn ScanSou
         };
         Ok(Box::new(OneCloud::new("PCD", (head, points))))
     };
-    let remarks = stamps.remark().into_iter().filter(|_| has_stamps).collect();
+    let remarks = stamps.remark().into_iter().filter(|_| has_stamps).chain(remark).collect();
     let clouds =
         Box::new(Files::new("PCD".into(), files.clone(), true, Box::new(open)).with_remarks(remarks));
     let clouds: Box<dyn CloudSource> = match options.sensor_origin_m {

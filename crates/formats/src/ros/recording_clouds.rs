@@ -2,11 +2,16 @@ use crate::CloudSource;
 use crate::poses::most_gap_ns;
 use crate::read_options::ReadOptions;
 use crate::ros::{BagOptions, PoseSource, open_bag};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use voxtile::{Error, Result};
 
 /// Opens the clouds of a recording. A pose file takes precedence over the recording's own poses.
 pub(crate) fn open(path: &Path, options: &ReadOptions) -> Result<Box<dyn CloudSource>> {
+    open_parts(&[path.to_owned()], options)
+}
+
+/// As [`open`], for a recording in several files, in their order.
+pub(crate) fn open_parts(paths: &[PathBuf], options: &ReadOptions) -> Result<Box<dyn CloudSource>> {
     check(options)?;
     let recording = &options.recording;
     let poses = match (&options.poses, &recording.odometry_topic) {
@@ -25,7 +30,7 @@ pub(crate) fn open(path: &Path, options: &ReadOptions) -> Result<Box<dyn CloudSo
         memory_bytes: options.memory_bytes,
         scratch: options.scratch.clone(),
     };
-    Ok(Box::new(open_bag(&[path.to_owned()], &bag)?))
+    Ok(Box::new(open_bag(paths, &bag)?))
 }
 
 /// Rejects options for values that the recording contains itself, which would be ignored.

@@ -1,6 +1,8 @@
 use super::point_store::{PointBudget, PointStore};
 use super::source::{ScanHead, ScanSource};
 use crate::poses::PoseSource;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
 use voxtile::Result;
 use voxtile::scan::{MovingMarks, Pose};
 use voxtile::space::Aabb;
@@ -19,11 +21,20 @@ pub struct Selection {
     pub ignored: Option<Aabb>,
     /// Pose of the sensor in the body, if the box is in the body frame. `None`: the box is in the sensor frame.
     pub body_from_sensor: Option<Pose>,
+    /// Scans of earlier inputs; `None` if each input is selected from alone.
+    so_far: Option<Arc<SoFar>>,
+}
+
+/// Number of scans of several inputs that were passed, and of those that were taken.
+#[derive(Debug, Default)]
+struct SoFar {
+    passed: AtomicU64,
+    taken: AtomicU64,
 }
 
 impl Default for Selection {
     fn default() -> Self {
-        Self { first: 0, count: None, every: 1, ignored: None, body_from_sensor: None }
+        Self { first: 0, count: None, every: 1, ignored: None, body_from_sensor: None, so_far: None }
     }
 }
 
@@ -33,16 +44,39 @@ impl Selection {
         self.first == 0 && self.count.is_none() && self.every <= 1 && self.ignored.is_none()
     }
 
+    /// Selects from the sequence of all sources to which clones of the result are applied, one source after the other.
+    #[must_use]
+    pub fn across_inputs(self) -> Self {
+        Self { so_far: Some(Arc::default()), ..self }
+    }
+
+    /// Selects from one source alone.
+    #[must_use]
+    pub fn of_one_input(self) -> Self {
+        Self { so_far: None, ..self }
+    }
+
+    /// Returns whether all scans that are wanted were taken from earlier inputs.
+    pub fn is_complete(&self) -> bool {
+        let taken = self.so_far.as_ref().map(|so_far| so_far.taken.load(Ordering::Relaxed));
+        taken.zip(self.count).is_some_and(|(taken, count)| taken >= count)
+    }
+
     /// Applies the selection to a source.
     pub fn of(self, source: Box<dyn ScanSource + Send>) -> Box<dyn ScanSource + Send> {
         if self.is_everything() {
             return source;
         }
+        let of_earlier = |number: fn(&SoFar) -> &AtomicU64| {
+            self.so_far.as_ref().map_or(0, |so_far| number(so_far).load(Ordering::Relaxed))
+        };
+        let earlier = [of_earlier(|so_far| &so_far.passed), of_earlier(|so_far| &so_far.taken)];
         Box::new(SelectedScans {
             source,
+            passed: earlier[0],
+            taken: earlier[1],
+            earlier,
             selection: self,
-            passed: 0,
-            taken: 0,
             bad: 0,
             unfiltered: PointStore::default(),
         })
@@ -53,9 +87,11 @@ impl Selection {
 struct SelectedScans {
     source: Box<dyn ScanSource + Send>,
     selection: Selection,
-    /// Number of source scans that were skipped or used.
+    /// Number of scans of this source and those before it that were skipped or used.
     passed: u64,
     taken: u64,
+    /// The two numbers before this source.
+    earlier: [u64; 2],
     /// Number of skipped scans that could not be read.
     bad: u64,
     unfiltered: PointStore,
@@ -64,6 +100,21 @@ struct SelectedScans {
 impl SelectedScans {
     fn is_at_end(&self) -> bool {
         self.selection.count.is_some_and(|count| self.taken >= count)
+    }
+
+    fn pass(&mut self) {
+        self.passed += 1;
+        if let Some(so_far) = &self.selection.so_far {
+            so_far.passed.store(self.passed, Ordering::Relaxed);
+        }
+    }
+
+    fn take(&mut self) {
+        self.pass();
+        self.taken += 1;
+        if let Some(so_far) = &self.selection.so_far {
+            so_far.taken.store(self.taken, Ordering::Relaxed);
+        }
     }
 
     /// Advances to the next selected scan. Returns `false` if there is none.
@@ -85,7 +136,7 @@ impl SelectedScans {
                     self.bad += 1;
                 }
             }
-            self.passed += 1;
+            self.pass();
         }
         Ok(true)
     }
@@ -130,9 +181,11 @@ impl SelectedScans {
 
 impl ScanSource for SelectedScans {
     fn len_hint(&self) -> Option<usize> {
-        let left = (self.source.len_hint()? as u64).saturating_sub(self.selection.first);
-        let all = left.div_ceil(self.selection.every.max(1));
-        Some(self.selection.count.map_or(all, |count| all.min(count)) as usize)
+        let [passed, taken] = self.earlier;
+        let end = passed.saturating_add(self.source.len_hint()? as u64);
+        let all = end.saturating_sub(self.selection.first).div_ceil(self.selection.every.max(1));
+        let all = self.selection.count.map_or(all, |count| all.min(count));
+        Some(all.saturating_sub(taken) as usize)
     }
 
     fn read_scan(&mut self, points: &mut PointStore) -> Result<Option<ScanHead>> {
@@ -144,7 +197,7 @@ impl ScanSource for SelectedScans {
             Some(ignored) => self.read_without_ignored(points, &ignored)?,
         };
         if head.is_some() {
-            (self.passed, self.taken) = (self.passed + 1, self.taken + 1);
+            self.take();
         }
         Ok(head)
     }
@@ -154,7 +207,7 @@ impl ScanSource for SelectedScans {
             if !self.seek()? || self.source.skip(1)? == 0 {
                 return Ok(skipped);
             }
-            (self.passed, self.taken) = (self.passed + 1, self.taken + 1);
+            self.take();
         }
         Ok(scans)
     }
@@ -162,7 +215,7 @@ impl ScanSource for SelectedScans {
     fn pass_unread(&mut self) -> bool {
         let is_passed = self.source.pass_unread();
         if is_passed {
-            (self.passed, self.taken) = (self.passed + 1, self.taken + 1);
+            self.take();
         }
         is_passed
     }

@@ -10,6 +10,7 @@
 
 mod autoware;
 mod column_grid;
+mod column_pages;
 #[cfg(feature = "las")]
 mod copc;
 #[cfg(feature = "las")]
@@ -19,6 +20,7 @@ mod csv;
 #[cfg(feature = "e57")]
 mod e57;
 mod flat_map;
+mod geotiff;
 mod glb;
 mod glb_json;
 mod greedy;
@@ -51,6 +53,7 @@ mod spool;
 mod stream_out;
 #[cfg(test)]
 mod testing;
+mod tiff_file;
 mod xyz;
 mod zip_store;
 

@@ -62,7 +62,7 @@ const TREE_REFUSAL: &str = "an octree file always contains free and occupied vox
 /// All output formats. Help texts, hints and option checks are generated from this table, and documents are checked
 /// against it.
 #[rustfmt::skip]
-const TABLE: [OutputFormat; 18] = [
+const TABLE: [OutputFormat; 19] = [
     OutputFormat { origin: Origin::Corner,
         ..row("ply", Some("ply"), "Points with doubles, probability, log-odds and count",
               stream!(ply::PlySink::new)) },
@@ -91,6 +91,9 @@ const TABLE: [OutputFormat; 18] = [
     OutputFormat { takes: &[Region, Which, Heights],
         ..row("heightmap", Some("png"), "Heights as a 16-bit PNG with a world file",
               files!(heightmap::HeightmapSink::create)) },
+    OutputFormat { takes: &[Region, Which, Heights],
+        ..row("geotiff", Some("tif"), "Heights as a GeoTIFF: highest, lowest and mean of each column of voxels",
+              files!(geotiff::GeoTiffSink::create)) },
     OutputFormat { takes: &[Region, Which, Cell], origin: Origin::Point,
         ..row("autoware", None, "A folder with a PCD file per grid square, and Autoware's metadata",
               files!(autoware::AutowareSink::create)) },
@@ -148,6 +151,7 @@ impl OutputFormats {
     /// Returns the format with the extension of a file name. Folder formats have none.
     pub fn of_path(&self, path: &Path) -> Option<&OutputFormat> {
         let name = path.file_name()?.to_string_lossy().to_ascii_lowercase();
+        let name = name.strip_suffix(".tiff").map_or(name.clone(), |before| format!("{before}.tif"));
         let is_end = |end: &str| name.strip_suffix(end).is_some_and(|before| before.ends_with('.'));
         let found = self.rows.iter().filter(|format| format.extension.is_some_and(is_end));
         // `.copc.laz` also ends with `.laz`.
@@ -170,6 +174,7 @@ mod tests {
                 assert_eq!(of_path(&name), Some(format.name));
             }
         }
+        assert_eq!(of_path("hall.TIFF"), Some("geotiff"));
         assert_eq!(of_path("hall.copc"), None);
         assert_eq!(of_path("laz"), None);
         assert_eq!(of_path("copc.laz"), Some("laz"));

@@ -95,7 +95,7 @@ fn unsupported_options_are_refused_with_alternatives() {
     let heights = refusal("a.index", |options| options.z_min_m = Some(1.0));
     assert!(
         heights.contains(
-            "index does not support it; formats that support it: nav2 heightmap; it cannot store it"
+            "index does not support it; formats that support it: nav2 heightmap geotiff; it cannot store it"
         ),
         "{heights}"
     );

@@ -49,6 +49,17 @@ impl Mapping {
 }
 
 #[test]
+fn the_tile_size_follows_the_resolution() {
+    let tile_m = |options: &[&str]| {
+        let folder = tempfile::tempdir().unwrap();
+        open(folder.path(), options).0.mapper.config().grid.tile_size_m()
+    };
+    assert_eq!(tile_m(&[]), 10.0);
+    assert_eq!(tile_m(&["--resolution", "0.15"]), 10.05);
+    assert_eq!(tile_m(&["--resolution", "0.15", "--tile-size", "3"]), 3.0);
+}
+
+#[test]
 fn a_cloud_on_a_damaged_tile_is_counted_and_others_are_mapped() {
     let folder = tempfile::tempdir().unwrap();
     let (mut mapping, _) = open(folder.path(), &[]);

@@ -23,7 +23,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from .. import files
-from .._voxtile import replace_tiles, crop, describe, join, verify
+from .._voxtile import crop, default_tile_size, describe, join, replace_tiles, verify
 from ..errors import ArgumentError, VoxtileError
 from ..files import ReadOptions
 from . import losses
@@ -107,7 +107,10 @@ def build(
     if resolution is not None:
         settings["resolution"] = resolution
     base = _base(output, settings) if update else None
-    tile_size = settings.get("tile_size", 10.0) if base is None else base.tile_size
+    if base is not None:
+        tile_size = base.tile_size
+    elif (tile_size := settings.get("tile_size")) is None:
+        tile_size = default_tile_size(settings.get("resolution", 0.1))
     size = advised_region_size(settings["max_range"], tile_size) if region_size is None else region_size
     _check(output, size, tile_size, settings, update)
     found: Any = _dask.Client.current() if client is None else client

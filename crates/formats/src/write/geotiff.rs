@@ -1,0 +1,371 @@
+use super::column_grid::nothing_to_draw;
+use super::column_pages::{Column, ColumnPages, PAGE_EDGE};
+use super::height_range::HeightRange;
+use super::lattice::Lattice;
+use super::options::WriteOptions;
+use super::out_file::OutFile;
+use super::row::{VoxelRow, VoxelSink, VoxelsHead};
+use super::tiff_file::{TiffFile, Values};
+use super::{Error, Result};
+use crate::crs_codes::{CrsCodes, FlatCode};
+use flate2::Compression;
+use flate2::write::ZlibEncoder;
+use std::collections::BTreeMap;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+/// Maximum number of tiles of the image: the file stores the place of each.
+const MAX_TILES: u64 = 1 << 22;
+
+/// Names of the bands.
+const BANDS: [&str; 3] = [
+    "top of the highest occupied voxel, m",
+    "bottom of the lowest occupied voxel, m",
+    "mean height of the centers of the occupied voxels, m",
+];
+
+/// Writer of the heights of occupied voxels as a GeoTIFF of three bands.
+pub(super) struct GeoTiffSink {
+    file: TiffFile,
+    head: VoxelsHead,
+    options: WriteOptions,
+    heights: HeightRange,
+    raster: Option<Raster>,
+}
+
+/// Place of the image, and its columns.
+struct Raster {
+    lattice: Lattice,
+    /// First column along x, and the one along y that the first row has.
+    first_x: i64,
+    first_y: i64,
+    /// Columns and rows.
+    size: [u32; 2],
+    /// Tiles along x and y.
+    tiles: [u64; 2],
+    columns: ColumnPages,
+}
+
+impl GeoTiffSink {
+    pub(super) fn create(head: &VoxelsHead, path: &Path, options: &WriteOptions) -> Result<Self> {
+        let heights = HeightRange::of(options)?;
+        Ok(Self {
+            file: TiffFile::create(path)?,
+            head: head.clone(),
+            options: options.clone(),
+            heights,
+            raster: None,
+        })
+    }
+}
+
+impl Raster {
+    /// Creates the raster of the bounding box in `head`. The first voxel relates indices to coordinates.
+    fn new(head: &VoxelsHead, first: &VoxelRow, scratch: &Path) -> Result<Self> {
+        let lattice = Lattice::of(first, head.resolution_m);
+        let [lowest, highest] = head.bounds_m.map(|corner| lattice.index_at(corner));
+        let size = [0, 1].map(|k| highest[k].saturating_sub(lowest[k]).saturating_add(1).max(1) as u64);
+        let tiles = size.map(|columns| columns.div_ceil(PAGE_EDGE as u64));
+        let is_small = tiles[0].checked_mul(tiles[1]).is_some_and(|tiles| tiles <= MAX_TILES);
+        let [Ok(width), Ok(height)] = size.map(u32::try_from) else { return Err(too_large(size)) };
+        if !is_small {
+            return Err(too_large(size));
+        }
+        let columns = ColumnPages::new(scratch)?;
+        let (first_x, first_y) = (lowest[0], highest[1]);
+        Ok(Self { lattice, first_x, first_y, size: [width, height], tiles, columns })
+    }
+
+    /// Returns the tile of a voxel's column, and its place in the tile.
+    fn place_of(&self, voxel: &VoxelRow) -> Result<(u64, usize)> {
+        let (x, y) = (i64::from(voxel.index[0]) - self.first_x, self.first_y - i64::from(voxel.index[1]));
+        let inside = |at: i64, k: usize| u64::try_from(at).ok().filter(|&at| at < u64::from(self.size[k]));
+        let (x, y) = inside(x, 0).zip(inside(y, 1)).ok_or_else(|| {
+            let reason = format!("voxel {:?} is outside of the announced bounds", voxel.index);
+            Error::argument("geotiff", reason)
+        })?;
+        let edge = PAGE_EDGE as u64;
+        Ok((y / edge * self.tiles[0] + x / edge, (y % edge * edge + x % edge) as usize))
+    }
+
+    /// Returns the three heights of a column in metres; NaN without an occupied voxel.
+    fn heights_of(&self, column: &Column, resolution_m: f64) -> [f32; 3] {
+        if column.count == 0 {
+            return [f32::NAN; 3];
+        }
+        let height = |z: i64| self.lattice.corner_m([0, 0, z])[2];
+        let mean = column.sum as f64 / f64::from(column.count) + 0.5;
+        let heights_m = [
+            height(i64::from(column.highest) + 1),
+            height(i64::from(column.lowest)),
+            height(0) + mean * resolution_m,
+        ];
+        heights_m.map(|height_m| height_m as f32)
+    }
+}
+
+fn too_large([width, height]: [u64; 2]) -> Error {
+    let reason = format!(
+        "{width} x {height} columns of voxels are too many for an image of {MAX_TILES} tiles: choose a region, or use \
+         coarser voxels"
+    );
+    Error::argument("geotiff", reason)
+}
+
+impl VoxelSink for GeoTiffSink {
+    fn put(&mut self, voxel: &VoxelRow) -> Result<()> {
+        let raster = match &mut self.raster {
+            Some(raster) => raster,
+            none => none.insert(Raster::new(&self.head, voxel, &self.options.scratch_folder)?),
+        };
+        let (tile, place) = raster.place_of(voxel)?;
+        if voxel.log_odds >= self.head.occupied_log_odds && self.heights.meets(voxel, self.head.resolution_m)
+        {
+            raster.columns.add(tile, place, voxel.index[2])?;
+        }
+        Ok(())
+    }
+
+    fn finish(mut self: Box<Self>) -> Result<()> {
+        let mut raster = self.raster.take().ok_or_else(nothing_to_draw)?;
+        let path = self.file.path().to_owned();
+        let mut bands: [Vec<f32>; 3] = Default::default();
+        let cells = PAGE_EDGE * PAGE_EDGE;
+        // All empty tiles are one.
+        let empty = append(&mut self.file, &path, &vec![f32::NAN; cells])?;
+        let mut places: BTreeMap<u64, [(u64, u64); 3]> = BTreeMap::new();
+        for tile in raster.columns.pages() {
+            bands.iter_mut().for_each(Vec::clear);
+            let columns = raster.columns.page(tile)?;
+            for column in columns {
+                let heights = raster.heights_of(&column, self.head.resolution_m);
+                bands.iter_mut().zip(heights).for_each(|(band, height)| band.push(height));
+            }
+            let mut of_tile = [empty; 3];
+            for (place, band) in of_tile.iter_mut().zip(&bands) {
+                *place = append(&mut self.file, &path, band)?;
+            }
+            places.insert(tile, of_tile);
+        }
+        let tiles = raster.tiles[0] * raster.tiles[1];
+        let place = |at: u64| places.get(&(at % tiles)).map_or(empty, |bands| bands[(at / tiles) as usize]);
+        let (offsets, lengths) = (|at: u64| place(at).0, |at: u64| place(at).1);
+        let fields =
+            self.fields(&raster, Values::Places(3 * tiles, &offsets), Values::Places(3 * tiles, &lengths));
+        let wkt = self.options.crs.as_deref().filter(|crs| needs_wkt(crs));
+        if let Some(wkt) = wkt {
+            write_aux(&aux_path(&self.options)?, wkt)?;
+        }
+        self.file.finish(&fields)
+    }
+}
+
+impl GeoTiffSink {
+    fn fields<'a>(
+        &self,
+        raster: &Raster,
+        offsets: Values<'a>,
+        lengths: Values<'a>,
+    ) -> Vec<(u16, Values<'a>)> {
+        let resolution_m = self.head.resolution_m;
+        let [x, y, _] = raster.lattice.corner_m([raster.first_x, raster.first_y + 1, 0]);
+        let (keys, text) = geo_keys(self.options.crs.as_deref());
+        let mut fields = vec![
+            (256, Values::Longs(vec![raster.size[0]])),
+            (257, Values::Longs(vec![raster.size[1]])),
+            (258, Values::Shorts(vec![32; 3])),
+            // Deflate.
+            (259, Values::Shorts(vec![8])),
+            // Small values are dark.
+            (262, Values::Shorts(vec![1])),
+            (277, Values::Shorts(vec![3])),
+            // Each band has its own tiles.
+            (284, Values::Shorts(vec![2])),
+            (305, Values::Text(concat!("voxtile ", env!("CARGO_PKG_VERSION")).to_owned())),
+            (322, Values::Longs(vec![PAGE_EDGE as u32])),
+            (323, Values::Longs(vec![PAGE_EDGE as u32])),
+            (324, offsets),
+            (325, lengths),
+            // The second and the third band are no colours.
+            (338, Values::Shorts(vec![0; 2])),
+            // Floating-point numbers.
+            (339, Values::Shorts(vec![3; 3])),
+            (33550, Values::Doubles(vec![resolution_m, resolution_m, 0.0])),
+            // The upper left corner of the image is at this point.
+            (33922, Values::Doubles(vec![0.0, 0.0, 0.0, x, y, 0.0])),
+            (34735, Values::Shorts(keys)),
+        ];
+        if !text.is_empty() {
+            fields.push((34737, Values::Text(text)));
+        }
+        let describe = |(band, name): (usize, &&str)| {
+            format!("<Item name=\"DESCRIPTION\" sample=\"{band}\" role=\"description\">{name}</Item>")
+        };
+        let items: String = BANDS.iter().enumerate().map(describe).collect();
+        fields.push((42112, Values::Text(format!("<GDALMetadata>{items}</GDALMetadata>"))));
+        fields.push((42113, Values::Text("nan".to_owned())));
+        fields
+    }
+}
+
+/// Compresses and appends a tile of a band. Returns its offset and length.
+fn append(file: &mut TiffFile, path: &Path, heights: &[f32]) -> Result<(u64, u64)> {
+    let mut encoder = ZlibEncoder::new(Vec::new(), Compression::default());
+    let failed = |error| Error::io(path, "compress", error);
+    for height in heights {
+        encoder.write_all(&height.to_le_bytes()).map_err(failed)?;
+    }
+    let bytes = encoder.finish().map_err(failed)?;
+    Ok((file.append(&bytes)?, bytes.len() as u64))
+}
+
+/// Returns whether a system has no EPSG code, so that its text is needed.
+fn needs_wkt(crs: &str) -> bool {
+    CrsCodes::of(crs).flat.is_none()
+}
+
+/// Returns the GeoTIFF keys of a coordinate system, and their text.
+fn geo_keys(crs: Option<&str>) -> (Vec<u16>, String) {
+    // Cells are areas, not points.
+    let (mut keys, mut text) = (vec![[1025, 0, 1, 1]], String::new());
+    const METRE: u16 = 9001;
+    const USER_DEFINED: u16 = 32767;
+    if let Some(crs) = crs {
+        let CrsCodes { flat, vertical } = CrsCodes::of(crs);
+        match flat {
+            Some(FlatCode::Projected(code)) => {
+                keys.extend([[1024, 0, 1, 1], [3072, 0, 1, code], [3076, 0, 1, METRE]]);
+            }
+            Some(FlatCode::Geographic(code)) => keys.extend([[1024, 0, 1, 2], [2048, 0, 1, code]]),
+            Some(FlatCode::Geocentric(code)) => keys.extend([[1024, 0, 1, 3], [2048, 0, 1, code]]),
+            None => {
+                // Parts of the text end with a bar; it is ASCII.
+                let citation: String = crs.chars().filter(|c| c.is_ascii() && *c != '|').collect();
+                text = citation.chars().take(usize::from(u16::MAX) - 1).collect::<String>() + "|";
+                keys.extend([[1024, 0, 1, USER_DEFINED], [1026, 34737, text.len() as u16, 0]]);
+            }
+        }
+        if let Some(code) = vertical {
+            keys.extend([[4096, 0, 1, code], [4099, 0, 1, METRE]]);
+        }
+    }
+    keys.sort_unstable();
+    let head = [1, 1, 0, keys.len() as u16];
+    (head.into_iter().chain(keys.into_iter().flatten()).collect(), text)
+}
+
+/// Returns the path of the file from which GDAL reads what a GeoTIFF cannot hold.
+fn aux_path(options: &WriteOptions) -> Result<PathBuf> {
+    Ok(options.companion_folder.join(format!("{}.aux.xml", options.final_name()?)))
+}
+
+fn write_aux(path: &Path, wkt: &str) -> Result<()> {
+    let escaped = wkt.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;");
+    let mut file = OutFile::create(path)?;
+    file.write(format!("<PAMDataset>\n  <SRS>{escaped}</SRS>\n</PAMDataset>\n").as_bytes())?;
+    file.finish()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::testing::{head_of, row};
+    use super::super::tiff_file::reader::fields_of;
+    use super::*;
+    use flate2::read::ZlibDecoder;
+    use std::io::Read;
+
+    /// Writes voxels. Returns the file and the fields of its directory.
+    fn written(rows: &[VoxelRow], options: &WriteOptions) -> (Vec<u8>, BTreeMap<u64, Vec<u64>>) {
+        let path = &options.final_path;
+        let mut sink = Box::new(GeoTiffSink::create(&head_of(rows), path, options).unwrap());
+        rows.iter().for_each(|row| sink.put(row).unwrap());
+        sink.finish().unwrap();
+        let bytes = std::fs::read(path).unwrap();
+        let fields = fields_of(&bytes);
+        (bytes, fields)
+    }
+
+    /// Returns the heights of a cell in each band.
+    fn cell(file: &(Vec<u8>, BTreeMap<u64, Vec<u64>>), column: usize, row: usize) -> [f32; 3] {
+        let (bytes, fields) = file;
+        let across = (fields[&256][0] as usize).div_ceil(PAGE_EDGE);
+        let tiles = fields[&324].len() / 3;
+        [0, 1, 2].map(|band| {
+            let tile = band * tiles + row / PAGE_EDGE * across + column / PAGE_EDGE;
+            let (at, length) = (fields[&324][tile] as usize, fields[&325][tile] as usize);
+            let mut values = Vec::new();
+            ZlibDecoder::new(&bytes[at..at + length]).read_to_end(&mut values).unwrap();
+            assert_eq!(values.len(), 4 * PAGE_EDGE * PAGE_EDGE);
+            let at = 4 * (row % PAGE_EDGE * PAGE_EDGE + column % PAGE_EDGE);
+            f32::from_le_bytes(values[at..at + 4].try_into().unwrap())
+        })
+    }
+
+    #[test]
+    fn heights_are_those_of_the_occupied_voxels_of_a_column() {
+        let folder = tempfile::tempdir().unwrap();
+        let options = WriteOptions::beside(&folder.path().join("dem.tif"));
+        // Voxels of 0.5 m in three of the image's tiles; the free one does not count.
+        let rows = [
+            row([-3, 7, -4], 0.9),
+            row([-3, 7, 1], 0.9),
+            row([-3, 7, 2], 0.9),
+            row([-3, 7, 9], 0.1),
+            row([-2, 6, 3], 0.2),
+            row([500, 7, 0], 0.9),
+            row([-3, -400, 5], 0.5),
+        ];
+        let file = written(&rows, &options);
+        assert_eq!([256, 257, 277].map(|tag| file.1[&tag][0]), [504, 408, 3]);
+        assert_eq!(file.1[&324].len(), 12);
+        assert_eq!(cell(&file, 0, 0), [1.5, -2.0, 1.0 / 12.0]);
+        assert!(cell(&file, 1, 1).iter().all(|height| height.is_nan()));
+        assert_eq!(cell(&file, 503, 0), [0.5, 0.0, 0.25]);
+        assert_eq!(cell(&file, 0, 407), [3.0, 2.5, 2.75]);
+        // The tile without a voxel is empty.
+        assert!(cell(&file, 503, 407)[0].is_nan());
+        let doubles = |tag: u64| file.1[&tag].iter().map(|&bits| f64::from_bits(bits)).collect::<Vec<_>>();
+        assert_eq!(doubles(33550), [0.5, 0.5, 0.0]);
+        assert_eq!(doubles(33922), [0.0, 0.0, 0.0, -1.5, 4.0, 0.0]);
+        assert_eq!(file.1[&34735], [1, 1, 0, 1, 1025, 0, 1, 1]);
+        let low = written(&rows, &WriteOptions { z_max_m: Some(0.5), ..options });
+        assert_eq!(cell(&low, 0, 0), [-1.5, -2.0, -1.75]);
+    }
+
+    #[test]
+    fn coordinate_systems_are_stored_by_their_codes() {
+        let keys = |crs: &str| geo_keys(Some(crs)).0;
+        assert_eq!(
+            keys("EPSG:25832"),
+            [1, 1, 0, 4, 1024, 0, 1, 1, 1025, 0, 1, 1, 3072, 0, 1, 25832, 3076, 0, 1, 9001]
+        );
+        let both =
+            r#"COMPD_CS["x",PROJCS["a",AUTHORITY["EPSG","25832"]],VERT_CS["b",AUTHORITY["EPSG","7837"]]]"#;
+        assert_eq!(keys(both)[16..], [3076, 0, 1, 9001, 4096, 0, 1, 7837, 4099, 0, 1, 9001]);
+        // A system without a code is text, in a file that GDAL reads too.
+        let folder = tempfile::tempdir().unwrap();
+        let mut options = WriteOptions::beside(&folder.path().join("dem.tif"));
+        options.crs = Some("LOCAL_CS[\"hall <1>\"]".to_owned());
+        let (_, fields) = written(&[row([0; 3], 0.9)], &options);
+        assert_eq!(fields[&34735], [1, 1, 0, 3, 1024, 0, 1, 32767, 1025, 0, 1, 1, 1026, 34737, 21, 0]);
+        assert_eq!(fields[&34737].len(), 22);
+        let aux = std::fs::read_to_string(folder.path().join("dem.tif.aux.xml")).unwrap();
+        assert!(aux.contains("<SRS>LOCAL_CS[\"hall &lt;1&gt;\"]</SRS>"), "{aux}");
+    }
+
+    #[test]
+    fn images_that_are_too_large_are_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        let options = WriteOptions::beside(&folder.path().join("dem.tif"));
+        let mut head = head_of(&[row([0; 3], 0.9)]);
+        head.voxels = 1;
+        for far in [1e6, f64::MAX] {
+            head.bounds_m[1] = [far, far, 1.0];
+            let mut sink = GeoTiffSink::create(&head, &options.final_path, &options).unwrap();
+            let error = sink.put(&row([0; 3], 0.9)).unwrap_err().to_string();
+            assert!(error.contains("choose a region"), "{error}");
+        }
+        let sink = Box::new(GeoTiffSink::create(&head, &options.final_path, &options).unwrap());
+        assert!(sink.finish().unwrap_err().to_string().contains("no voxels"));
+    }
+}

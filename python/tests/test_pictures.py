@@ -1,0 +1,89 @@
+"""What notebooks show of a map, and arrays for other libraries."""
+
+from __future__ import annotations
+
+import base64
+import re
+import struct
+import zlib
+from pathlib import Path
+
+import numpy as np
+import pytest
+import voxtile
+from numpy.typing import NDArray
+
+
+@pytest.fixture
+def room(tmp_path: Path) -> Path:
+    """Two walls, which leave most columns unknown."""
+    along = np.arange(-3.0, 3.0, 0.1)
+    walls = [np.stack([along, np.full(60, at), np.full(60, 0.3)], 1) for at in (-2.0, 2.0)]
+    with voxtile.Map.create(tmp_path / "room", 0.25) as made:
+        made.insert(np.concatenate(walls), origin=[0.0, 0.0, 0.3])
+    return tmp_path / "room"
+
+
+def pixels_of(png: bytes) -> NDArray[np.uint8]:
+    """Decodes a PNG of eight bits per channel without the library that wrote it."""
+    assert png[:8] == b"\x89PNG\r\n\x1a\n"
+    at, data = 8, b""
+    width = height = channels = 0
+    while at < len(png):
+        length, kind = struct.unpack(">I4s", png[at : at + 8])
+        body = png[at + 8 : at + 8 + length]
+        if kind == b"IHDR":
+            width, height, depth, color, _, _, interlaced = struct.unpack(">IIBBBBB", body)
+            assert (depth, interlaced) == (8, 0)
+            channels = {2: 3, 6: 4}[color]
+        elif kind == b"IDAT":
+            data += body
+        at += length + 12
+    lines = np.frombuffer(zlib.decompress(data), np.uint8).reshape(height, 1 + width * channels)
+    pixels = np.zeros((height + 1, width + 1, channels), np.int64)
+    for row in range(height):
+        method, line = lines[row, 0], lines[row, 1:].reshape(width, channels).astype(np.int64)
+        for column in range(width):
+            left, above, corner = pixels[row + 1, column], pixels[row, column + 1], pixels[row, column]
+            guess = left + above - corner
+            nearness = np.abs([guess - left, guess - above, guess - corner])
+            paeth = np.choose(nearness.argmin(0), [left, above, corner])
+            base = [0 * left, left, above, (left + above) // 2, paeth][method]
+            pixels[row + 1, column + 1] = (line[column] + base) % 256
+    return pixels[1:, 1:].astype(np.uint8)
+
+
+def test_the_picture_of_a_summary_is_opaque(room: Path) -> None:
+    pytest.importorskip("matplotlib")
+    with voxtile.open(room) as found:
+        text = found._repr_html_()
+    encoded = re.search('src="data:image/png;base64,([^"]+)"', text)
+    assert encoded is not None
+    pixels = pixels_of(base64.b64decode(encoded[1]))
+    assert pixels.shape[2] == 3 or (pixels[:, :, 3] == 255).all()
+    white = (pixels[:, :, :3] == 255).all(axis=2)
+    # The walls are at the edges, the unknown columns between them.
+    assert white[pixels.shape[0] // 2].all() and not white[0].any() and not white[-1].any()
+
+
+def test_a_plot_is_a_picture_in_a_notebook(room: Path) -> None:
+    pytest.importorskip("matplotlib")
+    with voxtile.open(room) as found:
+        figure = found.plot()
+    png = figure._repr_png_()
+    assert png.startswith(b"\x89PNG") and len(png) > 1000
+    formatters = pytest.importorskip("IPython.core.formatters")
+    # As in a notebook that has not imported pyplot.
+    assert formatters.PNGFormatter()(figure) == png
+
+
+def test_dense_arrays_are_shared_with_other_libraries(room: Path) -> None:
+    region = [[-3, -3, 0], [3, 3, 1]]
+    with voxtile.open(room) as found:
+        for values, of in (("occupancy", np.int8), ("probability", np.float64), ("log_odds", np.float64)):
+            dense, _ = found.to_dense(region, values)
+            assert dense.__dlpack_device__() == (1, 0)
+            shared = np.from_dlpack(dense)
+            assert shared.dtype == of and np.shares_memory(shared, dense)
+            assert np.array_equal(shared, dense, equal_nan=True)
+            assert dense.flags.writeable and dense.flags.c_contiguous
