@@ -124,7 +124,8 @@ impl CloudQueue {
     }
 }
 
-fn bytes_of(cloud: &Cloud) -> usize {
+/// Returns the memory that a cloud reserves in the queue.
+pub fn bytes_of(cloud: &Cloud) -> usize {
     let own_bytes = cloud.cdr.capacity() + cloud.frame.capacity() + CLOUD_BYTES;
     own_bytes.saturating_add(cloud.points_bytes)
 }

@@ -10,29 +10,38 @@
 //! ```
 
 mod args;
+mod arrival_watch;
 mod clearing_rule;
 mod cloud;
 mod cloud_points;
 mod cloud_queue;
 mod corrections;
 mod counters;
+mod drop_warnings;
+mod first_map;
 mod frame_owners;
 mod health;
 mod inbox;
 mod latencies;
+mod listen_address;
 mod live_map;
 mod local_mapping;
 mod local_share;
+mod log_format;
+mod logging;
 mod mapping;
 mod messages;
 mod names;
 mod node;
 mod parameters;
 mod parent_warnings;
+mod point_limits;
+mod pose_miss;
 mod pose_watch;
 mod publishers;
 mod refusal;
 mod remapping;
+mod repeated;
 mod services;
 mod stamp_check;
 mod stop_signals;
@@ -43,22 +52,21 @@ mod when_behind;
 use args::Args;
 use inbox::Inbox;
 use mapping::Mapping;
+use parameters::{Parsed, Remark};
 use std::process::ExitCode;
 use std::sync::Arc;
 
 fn main() -> ExitCode {
     // Use one malloc arena, so that --memory holds: DDS and the mapper run many threads.
     voxtile::begin_with_one_heap();
-    // ros2-client logs an error when it counts the subscribers of a topic without any. The rustdds writer logs an error
-    // when a reader requests a message that a newer one has replaced; some readers repeat the request 100 times.
-    let filter = "info,rustdds=error,rustdds::rtps::writer=off,ros2_client=off";
-    env_logger::Builder::from_env(env_logger::Env::default().default_filter_or(filter)).init();
     let arguments: Vec<_> = std::env::args_os().collect();
-    let args = parameters::parse(&arguments).unwrap_or_else(|error| error.exit());
+    let Parsed { args, remarks } = parameters::parse(&arguments).unwrap_or_else(|error| error.exit());
+    logging::begin(&args);
+    remarks.iter().for_each(Remark::log);
     match run(&args) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            eprintln!("voxtile-ros2: {error:#}");
+            logging::report(&error, args.log_format);
             ExitCode::FAILURE
         }
     }

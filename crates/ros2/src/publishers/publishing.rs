@@ -35,6 +35,12 @@ pub struct Publishing {
     diagnosing: Diagnosing,
 }
 
+/// Topics of clouds that the node publishes.
+pub const PUBLISHED_CLOUDS: [&str; 4] = [CENTERS, CHANGES, LOCAL_OCCUPIED, LOCAL_INFLATED];
+const CENTERS: &str = "octomap_point_cloud_centers";
+const CHANGES: &str = "octomap_point_cloud_changes";
+const LOCAL_OCCUPIED: &str = "local_occupied";
+const LOCAL_INFLATED: &str = "local_inflated";
 /// Interval between checks of the stop flag.
 const POLL_EVERY: Duration = Duration::from_millis(20);
 
@@ -56,7 +62,7 @@ impl Publishing {
             projected: args.projected_extent()?,
             octomap_binary: Outlet::new(transport, "octomap_binary", octomap)?,
             octomap_full: Outlet::new(transport, "octomap_full", octomap)?,
-            centers: Outlet::new(transport, "octomap_point_cloud_centers", cloud)?,
+            centers: Outlet::new(transport, CENTERS, cloud)?,
             markers: Outlet::new(
                 transport,
                 "occupied_cells_vis_array",
@@ -67,9 +73,9 @@ impl Publishing {
                 "projected_map",
                 TypeName::new("nav_msgs", "OccupancyGrid"),
             )?,
-            local_occupied: Outlet::new(transport, "local_occupied", cloud)?,
-            local_inflated: Outlet::new(transport, "local_inflated", cloud)?,
-            changing: Changing::new(transport, "octomap_point_cloud_changes")?,
+            local_occupied: Outlet::new(transport, LOCAL_OCCUPIED, cloud)?,
+            local_inflated: Outlet::new(transport, LOCAL_INFLATED, cloud)?,
+            changing: Changing::new(transport, CHANGES)?,
             diagnosing: Diagnosing::new(transport, &args.node_name)?,
             inbox,
             map,

@@ -90,6 +90,11 @@ impl GraphName {
         format!("{SPACE}/{}/*/*/*/MS/*/*/*/{name}/{type_name}/{type_hash}/*", self.domain_id)
     }
 
+    /// Returns a pattern for the tokens of all publishers.
+    pub fn publishers(&self) -> String {
+        format!("{SPACE}/{}/*/*/*/MP/*/*/*/*/*/*/*", self.domain_id)
+    }
+
     fn start(&self) -> String {
         format!("{SPACE}/{}/{}/0", self.domain_id, self.zenoh_id)
     }
@@ -97,6 +102,13 @@ impl GraphName {
     fn end(&self) -> String {
         format!("{NONE}/{}/{}", mangled(&self.namespace), self.node_name)
     }
+}
+
+/// Returns the Zenoh ID, the name and the DDS type of the topic of a publisher's token.
+pub fn publisher_of(token: &str) -> Option<(&str, String, &str)> {
+    let parts: Vec<&str> = token.split('/').collect();
+    let [_, _, zenoh_id, _, _, "MP", _, _, _, name, type_name, _, _] = *parts.as_slice() else { return None };
+    Some((zenoh_id, name.replace('%', "/"), type_name))
 }
 
 /// Returns the GID that `rmw_zenoh_cpp` derives from the token of an endpoint.
