@@ -23,6 +23,9 @@ const DEFAULT_INFLATION_M: f64 = 0.2;
 // clap reads these fields as options, serde reads them as ROS parameters: names, types and limits are the same.
 #[derive(Clone, Debug, Parser, Serialize, Deserialize)]
 #[command(name = "voxtile-ros2", version, max_term_width = 80, args_override_self = true)]
+#[command(
+    after_help = "`voxtile-ros2 health [ADDRESS:]PORT` checks a node that runs with --metrics, by its exit code."
+)]
 pub struct Args {
     /// Map folder; created if missing, continued if it exists
     #[arg(short = 'o', long = "output", value_name = "MAP")]
@@ -277,6 +280,13 @@ impl Args {
     /// Invalid names or remapping rules.
     pub fn names(&self) -> anyhow::Result<Names> {
         Names::new(&self.namespace, &self.node_name, &self.remap)
+    }
+
+    /// Returns the absolute names of the topics of clouds. Invalid names are returned as given.
+    pub fn cloud_topics(&self) -> Vec<String> {
+        let names = self.names().ok();
+        let full = |topic: &String| names.as_ref().map_or_else(|| topic.clone(), |names| names.full(topic));
+        self.cloud.iter().map(full).collect()
     }
 
     /// Returns the sensor model of a new map.

@@ -53,7 +53,7 @@ impl ArrivalWatch {
         let (names, now) = (args.names()?, Instant::now());
         let name = |topic: &str| names.full(topic);
         let topic = |name| Topic { name, arrived: 0, since: now, warned_at: None };
-        let topics: Vec<Topic> = args.cloud.iter().map(|cloud| topic(name(cloud))).collect();
+        let topics: Vec<Topic> = args.cloud_topics().into_iter().map(topic).collect();
         let read = topics.iter().map(|topic| topic.name.clone());
         let surroundings = Surroundings {
             known: read.chain(own.iter().map(|topic| name(topic))).collect(),
@@ -77,7 +77,7 @@ impl ArrivalWatch {
 
     fn check(&mut self, now: Instant) {
         let mut quiet = Vec::new();
-        for (topic, arrived) in self.topics.iter_mut().zip(self.inbox.arrived()) {
+        for (topic, (_, arrived)) in self.topics.iter_mut().zip(self.inbox.arrived()) {
             if topic.note(arrived, now) {
                 quiet.push((topic.name.clone(), now.saturating_duration_since(topic.since)));
             }

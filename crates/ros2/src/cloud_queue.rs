@@ -44,6 +44,11 @@ impl CloudQueue {
         self.clouds.len()
     }
 
+    /// Returns the reserved memory.
+    pub fn bytes(&self) -> usize {
+        self.bytes
+    }
+
     /// Returns whether a cloud must wait outside the queue until memory is free.
     pub fn must_wait(&self, cloud: &Cloud) -> bool {
         let needed = self.bytes.saturating_add(bytes_of(cloud));

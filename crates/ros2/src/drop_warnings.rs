@@ -21,7 +21,7 @@ pub struct DropWarnings {
 impl DropWarnings {
     pub fn new(args: &Args) -> Self {
         Self {
-            topics: args.cloud.clone(),
+            topics: args.cloud_topics(),
             queue_bytes: args.queue_bytes(),
             malformed_clouds: vec![Repeated::default(); args.cloud.len()],
             malformed_poses: Repeated::default(),

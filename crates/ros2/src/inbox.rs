@@ -24,8 +24,8 @@ struct State {
     queue: CloudQueue,
     transforms: TransformBuffer,
     counters: Counters,
-    /// Number of received clouds of each topic.
-    arrived: Vec<u64>,
+    /// Topics of clouds, each with the number of received clouds.
+    arrived: Vec<(String, u64)>,
     warnings: DropWarnings,
     /// Last received path, until it is taken.
     path: Option<Vec<StampedPose>>,
@@ -38,7 +38,8 @@ impl Inbox {
         let queue = CloudQueue::new(args.queue_bytes(), args.cloud.len(), args.when_behind);
         let (transforms, counters) = (TransformBuffer::new(args), Counters::default());
         let fixed_frame = args.frame_id.trim_start_matches('/').to_owned();
-        let (arrived, warnings) = (vec![0; args.cloud.len()], DropWarnings::new(args));
+        let arrived = args.cloud_topics().into_iter().map(|topic| (topic, 0)).collect();
+        let warnings = DropWarnings::new(args);
         let state = State {
             queue,
             transforms,
@@ -56,7 +57,7 @@ impl Inbox {
         let head = head(&cdr);
         let mut state = self.lock();
         state.counters.received += 1;
-        if let Some(arrived) = state.arrived.get_mut(topic) {
+        if let Some((_, arrived)) = state.arrived.get_mut(topic) {
             *arrived += 1;
         }
         let (header, points_bytes) = match head {
@@ -164,9 +165,14 @@ impl Inbox {
         state.warnings.too_large(topic, bytes);
     }
 
-    /// Returns the number of received clouds of each topic.
-    pub fn arrived(&self) -> Vec<u64> {
+    /// Returns the topics of clouds, each with the number of received clouds.
+    pub fn arrived(&self) -> Vec<(String, u64)> {
         self.lock().arrived.clone()
+    }
+
+    /// Returns the memory of the queued clouds.
+    pub fn queue_bytes(&self) -> usize {
+        self.lock().queue.bytes()
     }
 
     pub fn count(&self, count: impl FnOnce(&mut Counters)) {

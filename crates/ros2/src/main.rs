@@ -7,6 +7,7 @@
 //! Transport -> corrected path -> Mapping -> Remapping   one thread per path, concurrent with mapping
 //! LiveMap -> messages -> Transport                   publishers: one thread
 //! Transport -> orders -> Mapping, queries -> LiveMap  services: one thread per service
+//! CloudQueue, LiveMap -> /metrics, /health           monitor: one thread, and one per request
 //! ```
 
 mod args;
@@ -31,6 +32,7 @@ mod log_format;
 mod logging;
 mod mapping;
 mod messages;
+mod monitor;
 mod names;
 mod node;
 mod parameters;
@@ -52,6 +54,7 @@ mod when_behind;
 use args::Args;
 use inbox::Inbox;
 use mapping::Mapping;
+use monitor::MonitorServer;
 use parameters::{Parsed, Remark};
 use std::process::ExitCode;
 use std::sync::Arc;
@@ -60,6 +63,9 @@ fn main() -> ExitCode {
     // Use one malloc arena, so that --memory holds: DDS and the mapper run many threads.
     voxtile::begin_with_one_heap();
     let arguments: Vec<_> = std::env::args_os().collect();
+    if let Some(code) = monitor::health_command(&arguments) {
+        return code;
+    }
     let Parsed { args, remarks } = parameters::parse(&arguments).unwrap_or_else(|error| error.exit());
     logging::begin(&args);
     remarks.iter().for_each(Remark::log);
@@ -75,10 +81,11 @@ fn main() -> ExitCode {
 fn run(args: &Args) -> anyhow::Result<()> {
     let stop = stop_signals::catch()?;
     let inbox = Arc::new(Inbox::new(args));
+    let server = args.metrics.map(MonitorServer::bind).transpose()?;
     // Open the map before the node appears on the network, so that a failure is reported first.
     let (orders, placed_orders) = services::orders();
     let mapping = Mapping::open(args, inbox.clone(), placed_orders)?;
-    let node = node::start(args, &inbox, mapping.live(), &orders)?;
+    let node = node::start(args, &inbox, mapping.live(), &orders, server)?;
     let outcome = mapping.run(&stop);
     inbox.close();
     node.end();

@@ -17,7 +17,7 @@ use bytesize::ByteSize;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::mpsc::Receiver;
-use std::time::{Duration, Instant};
+use std::time::{Duration, Instant, SystemTime};
 use voxtile::operations::{self, OnlineRemap, Part};
 use voxtile::{
     Aabb, Clearing, Error, MapConfig, MapReader, MapView, Mapper, MemoryLimit, OutOfCoreTileMapper, Point,
@@ -48,11 +48,14 @@ pub struct Mapping {
     path_tolerance_m: f64,
     flush_every: Duration,
     flushed_at: Instant,
-    /// Whether a flush was begun whose result is not known yet.
-    is_flush_begun: bool,
+    /// Start of a flush whose result is not known yet.
+    flush_begun_at: Option<Instant>,
+    /// Number of successful background flushes, and end and duration of the last one.
+    flushes: (u64, Option<(SystemTime, Duration)>),
     has_flush_failed: bool,
     /// Warning about refused clouds.
     refused: Repeated,
+    refused_at: Option<(Instant, Refusal)>,
     logged_at: Instant,
     sampled_at: Instant,
     /// Time when the map on disk was last complete or last updated by a flush, and the number of its last scan at that
@@ -153,9 +156,11 @@ impl Mapping {
             path_tolerance_m: args.path_tolerance,
             flush_every,
             flushed_at: now,
-            is_flush_begun: false,
+            flush_begun_at: None,
+            flushes: (0, None),
             has_flush_failed: false,
             refused: Repeated::default(),
+            refused_at: None,
             logged_at: now,
             sampled_at: now,
             durable,
@@ -216,8 +221,11 @@ impl Mapping {
         if self.mapper.is_flushing() {
             return Ok(());
         }
-        if std::mem::take(&mut self.is_flush_begun) {
+        if let Some(begun) = self.flush_begun_at.take() {
             let flushed = self.mapper.end_flush();
+            if flushed.is_ok() {
+                self.flushes = (self.flushes.0 + 1, Some((SystemTime::now(), begun.elapsed())));
+            }
             self.note_flush(&flushed);
             flushed.or_else(if_fatal)?;
         }
@@ -235,9 +243,10 @@ impl Mapping {
             self.note_flush(&Ok(()));
             return Ok(());
         }
+        let now = Instant::now();
         let begun = self.mapper.begin_flush();
         match begun {
-            Ok(()) => self.is_flush_begun = true,
+            Ok(()) => self.flush_begun_at = Some(now),
             Err(_) => self.note_flush(&begun),
         }
         begun.or_else(if_fatal)
@@ -425,6 +434,11 @@ impl Mapping {
             has_flush_failed: self.has_flush_failed,
             local_map_bytes: self.local.bytes(),
             latencies: self.latencies.clone(),
+            flushes: self.flushes.0,
+            failed_flushes: self.inbox.counters().0.failed_flushes,
+            last_flush: self.flushes.1,
+            refused_at: self.refused_at,
+            sampled_at: Some(Instant::now()),
         });
     }
 
@@ -461,6 +475,7 @@ impl Mapping {
     fn refuse(&mut self, error: Error) -> voxtile::Result<()> {
         let Some(refusal) = Refusal::of(&error) else { return Err(error) };
         self.inbox.count(|counters| refusal.count(counters));
+        self.refused_at = Some((Instant::now(), refusal));
         // Each cloud may fail for the same reason.
         match self.refused.note(1, Instant::now()) {
             Some(count) => log::warn!("{} refused: {error:#}", counted(count, "cloud")),

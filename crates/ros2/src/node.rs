@@ -2,6 +2,7 @@ use crate::args::Args;
 use crate::arrival_watch::ArrivalWatch;
 use crate::inbox::Inbox;
 use crate::live_map::LiveMap;
+use crate::monitor::{Monitor, MonitorServer};
 use crate::publishers::{PUBLISHED_CLOUDS, Publishing};
 use crate::services::{self, Orders};
 use crate::transport::{Message, Qos, Transport, TypeName, spawn};
@@ -40,6 +41,7 @@ pub fn start(
     inbox: &Arc<Inbox>,
     map: Arc<LiveMap>,
     orders: &Orders,
+    server: Option<MonitorServer>,
 ) -> anyhow::Result<RunningNode> {
     let mut transport = Transport::join(args, inbox)?;
     let volatile = Qos::best_effort(5);
@@ -71,17 +73,21 @@ pub fn start(
             Box::new(move |message: Message| to.put_path(&message.cdr)),
         )?;
     }
-    let names = args.names()?;
-    let clouds: Vec<String> = args.cloud.iter().map(|topic| names.full(topic)).collect();
-    log::info!("subscribed to {} in domain {}", clouds.join(", "), args.domain_id);
+    log::info!("subscribed to {} in domain {}", args.cloud_topics().join(", "), args.domain_id);
     services::start(args, &mut transport, &map, orders)?;
-    let mut publishing = Publishing::new(args, &mut transport, inbox.clone(), map)?;
+    let mut publishing = Publishing::new(args, &mut transport, inbox.clone(), map.clone())?;
     let arrivals = ArrivalWatch::new(args, inbox.clone(), transport.graph(), &PUBLISHED_CLOUDS)?;
     let stop = Arc::new(AtomicBool::new(false));
     let (of_publishing, of_arrivals) = (stop.clone(), stop.clone());
-    let threads = vec![
+    let mut threads = vec![
         spawn("publisher", move || publishing.run(&of_publishing))?,
         spawn("arrivals", move || arrivals.run(&of_arrivals))?,
     ];
+    if let Some(server) = server {
+        let memory_limit_bytes = args.memory.as_u64();
+        let monitor = Arc::new(Monitor { inbox: inbox.clone(), map, memory_limit_bytes });
+        let of_server = stop.clone();
+        threads.push(spawn("monitoring", move || server.run(monitor, &of_server))?);
+    }
     Ok(RunningNode { threads, stop, transport })
 }

@@ -39,8 +39,8 @@ pub struct Missed {
 const DELAY: Duration = Duration::from_secs(3);
 
 impl PoseWatch {
-    pub fn new(topics: &[String]) -> Self {
-        let topics = topics.iter().map(|name| Topic { name: name.clone(), ..Topic::default() });
+    pub fn new(topics: Vec<String>) -> Self {
+        let topics = topics.into_iter().map(|name| Topic { name, ..Topic::default() });
         Self { topics: topics.collect() }
     }
 
@@ -126,7 +126,7 @@ mod tests {
     const DROPPED: Missed = Missed { is_dropped: true, ..WAITS };
 
     fn watch() -> PoseWatch {
-        PoseWatch::new(&["/front".to_owned(), "/rear".to_owned()])
+        PoseWatch::new(vec!["/front".to_owned(), "/rear".to_owned()])
     }
 
     #[test]

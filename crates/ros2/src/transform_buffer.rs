@@ -61,7 +61,7 @@ impl TransformBuffer {
             owners: FrameOwners::default(),
             sensors: HashMap::new(),
             parents: ParentWarnings::default(),
-            watch: PoseWatch::new(&args.cloud),
+            watch: PoseWatch::new(args.cloud_topics()),
             refused_at: None,
         }
     }
