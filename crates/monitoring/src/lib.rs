@@ -14,4 +14,4 @@ mod time_text;
 pub use counted_log::{CountedLog, log_counts};
 pub use json_line::json_line;
 pub use metrics::{CONTENT_TYPE, Family, Metrics};
-pub use process::process;
+pub use process::{note_start, process};

@@ -2,12 +2,16 @@ use crate::{Metrics, log_counts};
 use std::sync::LazyLock;
 use std::time::{SystemTime, UNIX_EPOCH};
 
-/// Time of the first call of [`process`], which is close to the start.
+/// Time of the first call of [`note_start`] or [`process`].
 static STARTED: LazyLock<f64> =
     LazyLock::new(|| SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default().as_secs_f64());
 
+/// Records the time of the start of the program.
+pub fn note_start() {
+    LazyLock::force(&STARTED);
+}
+
 /// Adds the metrics of this process by the usual names (memory and files on Linux alone), of its log, and its version.
-/// Call it once at the start of the program to record the time of the start.
 pub fn process(metrics: &mut Metrics, version: &str) {
     metrics.gauge("voxtile_build_info", "Version of the program.").labelled(&[("version", version)], 1);
     metrics

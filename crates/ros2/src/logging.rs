@@ -12,6 +12,7 @@ const OTHERS: &str = "rustdds=error,rustdds::rtps::writer=off,ros2_client=off";
 
 /// Starts the log on standard error. `--verbose` overrides `RUST_LOG`.
 pub fn begin(args: &Args) {
+    voxtile_monitoring::note_start();
     let mut builder = env_logger::Builder::new();
     let filter = match args.verbose {
         0 => "info",
