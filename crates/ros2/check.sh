@@ -124,16 +124,18 @@ flood() {
 
 # Dropped clouds are explained in the log, metrics and health are served, and files of octomap_server are read.
 monitoring() {
-    local address topics="mapped unknown registered malformed late cloud_in"
+    local address options topics="mapped unknown registered malformed late"
     printf 'octomap_server:\n  ros__parameters:\n    filter_ground_plane: true\n' >"$work/octomap_server.yaml"
     local status=0 refusal
     refusal=$("$program" -o "$map" --params-file "$work/octomap_server.yaml" 2>&1) || status=$?
     [ $status = 2 ] && [[ $refusal == *"octomap_server.yaml:3: parameter filter_ground_plane is true"* ]] ||
         fail "a ground filter is not refused: $refusal"
     sed -i s/true/false/ "$work/octomap_server.yaml"
-    # shellcheck disable=SC2046
-    start --params-file "$work/octomap_server.yaml" --resolution 0.1 --flush-every 2 --metrics 0 --log-format json \
-        $(printf -- '--cloud %s ' $topics)
+    # `cloud_in` is the default of the launch file.
+    options=$("$python" crates/ros2/tests/launch_file.py "output:=$map" "params_file:=$work/octomap_server.yaml" \
+        metrics:=0) || fail "the launch file"
+    # shellcheck disable=SC2046,SC2086
+    start --resolution 0.1 --flush-every 2 --log-format json $(printf -- '--cloud %s ' $topics) $options
     "$python" crates/ros2/tests/monitoring.py send $domain 7 || fail "the peer failed"
     address=$(sed -n 's|.*serving http://\([0-9.:]*\)/metrics.*|\1|p' "$work/$kind.log")
     "$python" crates/ros2/tests/monitoring.py metrics "${address#*:}" || fail "metrics"

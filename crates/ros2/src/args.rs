@@ -17,6 +17,7 @@ use voxtile::sensor::LogOdds;
 use voxtile::{MapConfig, SensorModel};
 use voxtile_local::LocalParameters;
 
+pub const DEFAULT_NODE_NAME: &str = "voxtile_ros2";
 const DEFAULT_INFLATION_M: f64 = 0.2;
 
 /// ROS 2 node that maps point clouds into a voxtile map. Lengths are in metres, times in seconds.
@@ -156,7 +157,7 @@ pub struct Args {
     pub inflation_range: f64,
 
     /// Name of the node; also the prefix of some service names
-    #[arg(long, value_name = "NAME", default_value = "voxtile_ros2")]
+    #[arg(long, value_name = "NAME", default_value = DEFAULT_NODE_NAME)]
     pub node_name: String,
     /// Namespace of the node, prefixed to relative names
     #[arg(long, value_name = "NS", default_value = "/")]

@@ -4,7 +4,7 @@ use super::parameter_file::{self, NodeName};
 use super::remark::Remark;
 use super::ros_args::RosArgs;
 use super::value::Value;
-use crate::args::Args;
+use crate::args::{Args, DEFAULT_NODE_NAME};
 use clap::error::ErrorKind;
 use clap::parser::ValueSource;
 use clap::{ArgMatches, CommandFactory as _, Error, FromArgMatches as _};
@@ -128,9 +128,9 @@ impl AllGiven {
 
 fn node_of(named: &ArgMatches) -> NodeName {
     let text = |id| named.try_get_one::<String>(id).ok().flatten().cloned().unwrap_or_default();
-    let namespace = text("namespace");
-    let full = format!("/{}/{}", namespace.trim_matches('/'), text("node_name")).replace("//", "/");
-    NodeName { full, is_default: named.value_source("node_name") != Some(ValueSource::CommandLine) }
+    let (namespace, name) = (text("namespace"), text("node_name"));
+    let full = format!("/{}/{name}", namespace.trim_matches('/')).replace("//", "/");
+    NodeName { full, is_default: name == DEFAULT_NODE_NAME }
 }
 
 /// Returns the options with one field replaced.
