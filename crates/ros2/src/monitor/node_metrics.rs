@@ -105,7 +105,7 @@ fn flushes(metrics: &mut Metrics, health: &Health) {
     metrics.counter("voxtile_flushes_total", "Successful background flushes.").value(health.flushes);
     metrics.counter("voxtile_flush_failures_total", "Failed flushes.").value(health.failed_flushes);
     let age = health.flush_age.as_secs_f64();
-    metrics.gauge("voxtile_flush_age_seconds", "Age of the oldest scan that is not durable.").value(age);
+    metrics.gauge("voxtile_flush_age_seconds", "Time since the map on disk was last complete.").value(age);
     if let Some((at, took)) = health.last_flush {
         let at = at.duration_since(UNIX_EPOCH).unwrap_or_default().as_secs_f64();
         metrics.gauge("voxtile_last_flush_timestamp_seconds", "End of the last flush since 1970.").value(at);
