@@ -107,8 +107,8 @@ impl Surroundings {
         if kinds.contains(CLOUD) {
             return match self.transport {
                 TransportName::Dds => {
-                    "it has a publisher, but no message arrives. Is the sensor on? Large clouds are \
-                                       lost if net.core.rmem_max is small"
+                    "it has a publisher, but no message arrives. Is the sensor on? Large clouds are lost if \
+                     net.core.rmem_max is small"
                         .to_owned()
                 }
                 TransportName::Zenoh => {
@@ -120,9 +120,8 @@ impl Surroundings {
             Some(kind) => format!("it has the type {}, not {CLOUD}; ", kind.escape_debug()),
             None => String::new(),
         };
-        let is_other = |published: &&Published| {
-            published.kind == CLOUD && !self.known.iter().any(|known| *known == published.topic)
-        };
+        let is_other =
+            |published: &&Published| published.kind == CLOUD && !self.known.contains(&published.topic);
         let others: BTreeSet<&str> =
             published.iter().filter(is_other).map(|published| published.topic.as_str()).collect();
         if let Some(first) = others.first() {

@@ -12,6 +12,7 @@ pub struct DropWarnings {
     queue_bytes: usize,
     malformed_clouds: Vec<Repeated>,
     malformed_poses: Repeated,
+    malformed_paths: Repeated,
     too_large: Repeated,
     behind: Repeated,
     thinned: Repeated,
@@ -25,6 +26,7 @@ impl DropWarnings {
             queue_bytes: args.queue_bytes(),
             malformed_clouds: vec![Repeated::default(); args.cloud.len()],
             malformed_poses: Repeated::default(),
+            malformed_paths: Repeated::default(),
             too_large: Repeated::default(),
             behind: Repeated::default(),
             thinned: Repeated::default(),
@@ -43,7 +45,13 @@ impl DropWarnings {
 
     pub fn malformed_poses(&mut self, why: &dyn Display) {
         if let Some(count) = self.malformed_poses.note(1, Instant::now()) {
-            log::warn!("{} dropped: {}", counted(count, "malformed message of transforms"), printable(why));
+            log::warn!("{} dropped: {}", counted(count, "malformed transform message"), printable(why));
+        }
+    }
+
+    pub fn malformed_path(&mut self, why: &dyn Display) {
+        if let Some(count) = self.malformed_paths.note(1, Instant::now()) {
+            log::warn!("{} ignored: {}", counted(count, "malformed path"), printable(why));
         }
     }
 

@@ -117,8 +117,8 @@ impl Inbox {
                 state.counters.malformed += 1;
             }
             Err(error) => {
-                log::warn!("path ignored: cannot decode it: {error}");
                 state.counters.malformed += 1;
+                state.warnings.malformed_path(&error);
             }
         }
     }

@@ -20,6 +20,9 @@ impl Responses {
     }
 }
 
+/// Returns a value of a map, if there is one.
+type ValueOf = fn(&ServedMap) -> Option<u64>;
+
 /// Returns the metrics of the server and its maps.
 pub fn metrics(
     maps: &[Arc<ServedMap>],
@@ -39,7 +42,7 @@ pub fn metrics(
     metrics
         .gauge("voxtile_http_response_memory_limit_bytes", "Limit for this memory.")
         .value(AnswerMemory::limit_bytes() as u64);
-    let gauges: [(&str, &str, fn(&ServedMap) -> Option<u64>); 6] = [
+    let gauges: [(&str, &str, ValueOf); 6] = [
         ("voxtile_map_scans", "Scans in the map.", |map| Some(map.now().map.scan_number())),
         ("voxtile_map_tiles", "Tiles of the map.", |map| Some(map.now().map.tile_indices().len() as u64)),
         ("voxtile_map_disk_bytes", "Size of the map's tiles on disk.", |map| match &map.now().map {

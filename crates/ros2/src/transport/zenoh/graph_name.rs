@@ -177,4 +177,19 @@ mod tests {
         assert!(pattern.includes(&token(End::Subscription)));
         assert!(!pattern.includes(&token(End::Publisher)));
     }
+
+    #[test]
+    fn topics_of_publishers_are_read_from_tokens() {
+        let (node, names) = in_namespace("/robot");
+        let cloud = Channel::topic(&names, "cloud_in", TypeName::new("sensor_msgs", "PointCloud2")).unwrap();
+        let token = |end| node.token_of(9, end, &cloud, Qos::best_effort(5));
+        let pattern = zenoh::key_expr::KeyExpr::try_from(node.publishers()).unwrap();
+        assert!(pattern.includes(&zenoh::key_expr::KeyExpr::try_from(token(End::Publisher)).unwrap()));
+        let found =
+            publisher_of(&token(End::Publisher)).map(|(id, topic, kind)| format!("{id} {topic} {kind}"));
+        assert_eq!(found.as_deref(), Some("ab12 /robot/cloud_in sensor_msgs::msg::dds_::PointCloud2_"));
+        for other in [token(End::Subscription), node.token(), String::new(), "a/".repeat(12)] {
+            assert_eq!(publisher_of(&other), None, "{other}");
+        }
+    }
 }
