@@ -4,7 +4,8 @@
 # hostile peer. Outputs must equal those of `voxtile export`; services are also called. Passes with a message if Python
 # or PyPI is missing. The test `rclpy` uses ROS 2 itself: rclpy of Jazzy over Fast DDS, from PyPI (for Python 3.11).
 #
-# check.sh [friendly] [hostile] [types] [variants] [odometry] [launch] [path] [real] [sensors] [flood] [rclpy] [zenoh]
+# check.sh [friendly] [hostile] [types] [variants] [odometry] [launch] [path] [real] [sensors] [flood] [monitoring]
+#          [rclpy] [zenoh]
 #
 # VOXTILE_ROS2_PYTHON is a Python with the packages, VOXTILE_ZENOH_PYTHON one with eclipse-zenoh as well,
 # VOXTILE_RCLPY_PYTHON one with rclpy as well. VOXTILE and VOXTILE_ROS2 are built programs, VOXTILE_ROS2_ZENOH is the
@@ -21,7 +22,7 @@ trap 'for one in $node $listener; do kill "$one" 2>/dev/null || true; done; rm -
 python=${VOXTILE_ROS2_PYTHON:-}
 if [ -z "$python" ]; then
     python=$work/venv/bin/python
-    packages="cyclonedds==11.0.1 eclipse-zenoh zenoh-ros2-sdk rosbags numpy"
+    packages="cyclonedds==11.0.1 eclipse-zenoh zenoh-ros2-sdk rosbags numpy prometheus-client"
     # shellcheck disable=SC2086
     if ! { python3 -m venv "$work/venv" && "$python" -m pip -q install $packages; }; then
         echo "skipped: no Python with cyclonedds and rosbags; set VOXTILE_ROS2_PYTHON"
@@ -121,6 +122,30 @@ flood() {
     [ $((mapped + without)) = "$waiting" ] && [ "$mapped" -gt 0 ] || fail "the waiting clouds were not mapped"
 }
 
+# Dropped clouds are explained in the log, metrics and health are served, and files of octomap_server are read.
+monitoring() {
+    local address options topics="mapped unknown registered malformed late"
+    printf 'octomap_server:\n  ros__parameters:\n    filter_ground_plane: true\n' >"$work/octomap_server.yaml"
+    local status=0 refusal
+    refusal=$("$program" -o "$map" --params-file "$work/octomap_server.yaml" 2>&1) || status=$?
+    [ $status = 2 ] && [[ $refusal == *"octomap_server.yaml:3: parameter filter_ground_plane is true"* ]] ||
+        fail "a ground filter is not refused: $refusal"
+    sed -i s/true/false/ "$work/octomap_server.yaml"
+    # `cloud_in` is the default of the launch file.
+    options=$("$python" crates/ros2/tests/launch_file.py "output:=$map" "params_file:=$work/octomap_server.yaml" \
+        metrics:=0) || fail "the launch file"
+    # shellcheck disable=SC2046,SC2086
+    start --resolution 0.1 --flush-every 2 --log-format json $(printf -- '--cloud %s ' $topics) $options
+    "$python" crates/ros2/tests/monitoring.py send $domain 7 || fail "the peer failed"
+    address=$(sed -n 's|.*serving http://\([0-9.:]*\)/metrics.*|\1|p' "$work/$kind.log")
+    "$python" crates/ros2/tests/monitoring.py metrics "${address#*:}" || fail "metrics"
+    [[ $("$program" health "$address") == ok* ]] || fail "the node is not healthy"
+    end INT
+    ! "$program" health "$address" >/dev/null || fail "a node that has ended is healthy"
+    "$python" crates/ros2/tests/monitoring.py log "$work/$kind.log" || fail "the log"
+    echo "monitoring: causes, metrics, health"
+}
+
 # Exchanges messages and service calls with nodes of ROS 2 itself and its default middleware.
 rclpy() {
     local python=${VOXTILE_RCLPY_PYTHON:-$work/venv_ros/bin/python}
@@ -171,15 +196,15 @@ zenoh() {
 
 # Folder of real clouds, if available.
 street=${VOXTILE_DATA:-../shared/data}/mulran_riverside02_a
-for kind in ${*:-friendly hostile types variants odometry launch path real sensors flood rclpy zenoh}; do
+for kind in ${*:-friendly hostile types variants odometry launch path real sensors flood monitoring rclpy zenoh}; do
     map=$work/$kind count=30 resolution=0.1 seconds=12
     if [ $kind = zenoh ] || [ $kind = rclpy ]; then
         $kind
         continue
     fi
-    if [ $kind = flood ]; then
+    if [ $kind = flood ] || [ $kind = monitoring ]; then
         domain=$((RANDOM % 100 + 100))
-        flood
+        $kind
         continue
     fi
     sent=$count

@@ -50,6 +50,9 @@ pub struct Cli {
     /// Log flushes and other steps; -vv also logs each tile read or written. RUST_LOG sets the level by module
     #[arg(short, long, global = true, action = clap::ArgAction::Count)]
     pub verbose: u8,
+    /// Format of the log and of errors on standard error
+    #[arg(long, global = true, value_enum, default_value_t = LogFormatName::Text, value_name = "FORMAT")]
+    pub log_format: LogFormatName,
     /// Print only errors, results and JSON: no warnings, summaries or progress bars
     #[arg(short, long, global = true, conflicts_with = "verbose")]
     pub quiet: bool,
@@ -218,6 +221,14 @@ impl LeftOutArgs {
     fn is_json(&self) -> bool {
         self.arguments.iter().any(|argument| argument == "--json")
     }
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub enum LogFormatName {
+    /// Lines of text
+    Text,
+    /// A JSON object per line: time (UTC), level, target, message
+    Json,
 }
 
 #[derive(Clone, Copy, Debug, ValueEnum)]

@@ -1,11 +1,12 @@
 use crate::args::{BuildArgs, InsertName, ModelName};
 use crate::counted::Counted;
 use crate::failure::JsonTo;
+use crate::logging::print_message;
 use crate::octree_choice::octree_config;
 use crate::part::region_of;
 use crate::progress::at_terminal;
 use crate::read_options::read_options;
-use crate::run::{INTERRUPTED, print_message};
+use crate::run::INTERRUPTED;
 use crate::{stop_signal, summary};
 use bytesize::ByteSize;
 use std::process::ExitCode;

@@ -1,7 +1,8 @@
 use crate::args::Command;
 use crate::json;
+use crate::logging::{print_error, print_message};
 use crate::option_names::{option_of, with_options};
-use crate::run::{INTERRUPTED, print_message};
+use crate::run::INTERRUPTED;
 use serde::Serialize;
 use std::io;
 use std::process::ExitCode;
@@ -64,7 +65,7 @@ impl JsonTo {
             return ExitCode::SUCCESS;
         }
         let message = message_of(error);
-        print_message(format_args!("{message}"));
+        print_error(format_args!("{message}"));
         let known = error.downcast_ref::<Error>();
         self.print(&Failure::of(known, &message));
         exit_code_of(known)

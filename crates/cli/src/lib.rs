@@ -21,6 +21,7 @@ mod info;
 mod json;
 mod local;
 mod local_table;
+mod logging;
 mod man;
 mod merge;
 mod octree_choice;

@@ -1,9 +1,9 @@
 use crate::args::RemoveScansArgs;
 use crate::counted::Counted;
 use crate::json;
+use crate::logging::print_message;
 use crate::quiet::summary_out;
 use crate::replay::{self, Job};
-use crate::run::print_message;
 use serde::Serialize;
 use std::io::Write;
 use std::path::Path;

@@ -2,8 +2,9 @@
 
 use crate::args::ReplayArgs;
 use crate::build::memory_of;
+use crate::logging::print_message;
 use crate::progress::Progress;
-use crate::run::{INTERRUPTED, print_message};
+use crate::run::INTERRUPTED;
 use crate::stop_signal;
 use indicatif::HumanCount;
 use std::io::Write;

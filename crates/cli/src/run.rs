@@ -6,14 +6,13 @@ use super::failure::JsonTo;
 use super::view;
 use super::{
     build, clean, clear, completions, convert, crop, decay, demo, diff, digest, export, import, info, local,
-    man, merge, option_names, picture, progress, query, quiet, raycast, remap, remove_points, remove_scans,
+    logging, man, merge, option_names, picture, query, quiet, raycast, remap, remove_points, remove_scans,
     repair, report, revert, scans, share, snapshot, snapshots, threads, verify,
 };
 #[cfg(feature = "bucket")]
 use super::{pull, push};
 use clap::{CommandFactory as _, FromArgMatches as _};
 use std::ffi::OsString;
-use std::io::Write;
 use std::process::ExitCode;
 use voxtile::begin_with_one_heap;
 #[cfg(feature = "bucket")]
@@ -31,14 +30,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
     let matches = matches.unwrap_or_else(|error| error.exit());
     option_names::name_options_of(matches.subcommand_name().unwrap_or_default());
     let cli = Cli::from_arg_matches(&matches).unwrap_or_else(|error| error.exit());
-    // Command-line levels override the environment.
-    let mut log = env_logger::Builder::new();
-    log.filter_level(cli.log_level()).format_timestamp(None);
-    log.target(env_logger::Target::Pipe(Box::new(progress::AboveBar)));
-    if !cli.quiet && cli.verbose == 0 {
-        log.parse_default_env();
-    }
-    log.init();
+    logging::begin(&cli);
     #[cfg(feature = "bucket")]
     if let Some(timeout) = cli.bucket_timeout {
         place::set_bucket_timeout(timeout);
@@ -185,11 +177,6 @@ fn is_parallel(command: &Command) -> bool {
         | Command::Completions(_)
         | Command::Man(_) => false,
     }
-}
-
-/// Prints a line on standard error. Ignores a failed write, which cannot be reported.
-pub fn print_message(line: std::fmt::Arguments<'_>) {
-    let _ = writeln!(std::io::stderr().lock(), "voxtile: {line}");
 }
 
 /// Exit code after Ctrl-C or SIGTERM; all scans so far were flushed.

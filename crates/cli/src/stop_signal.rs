@@ -1,8 +1,8 @@
+use crate::logging::print_message;
 use crate::run::INTERRUPTED;
 use signal_hook::consts::{SIGINT, SIGTERM};
 use signal_hook::flag;
 use signal_hook::iterator::Signals;
-use std::io::Write;
 use std::path::PathBuf;
 use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, OnceLock};
@@ -65,11 +65,11 @@ fn catch_with_messages(first_message: &'static str, second_message: &'static str
                 None => {
                     first = Some(Instant::now());
                     stop_flag.set();
-                    print_message(first_message);
+                    print_message(format_args!("{first_message}"));
                 }
                 Some(first) if first.elapsed() < GRACE => {}
                 Some(_) => {
-                    print_message(second_message);
+                    print_message(format_args!("{second_message}"));
                     std::process::exit(i32::from(INTERRUPTED));
                 }
             }
@@ -90,9 +90,4 @@ fn catch_without_thread(stop: &Stop) -> anyhow::Result<()> {
         flag::register(signal, stop_flag.clone())?;
     }
     Ok(())
-}
-
-fn print_message(line: &str) {
-    // A failed write to standard error cannot be reported.
-    writeln!(std::io::stderr(), "voxtile: {line}").unwrap_or_default();
 }

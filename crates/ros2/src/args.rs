@@ -1,5 +1,8 @@
 use crate::clearing_rule::ClearingRule;
+use crate::listen_address::ListenAddress;
+use crate::log_format::LogFormat;
 use crate::names::Names;
+use crate::point_limits::PointLimits;
 use crate::publishers::Extent;
 use crate::services::Rmw;
 use crate::transport::TransportName;
@@ -14,19 +17,29 @@ use voxtile::sensor::LogOdds;
 use voxtile::{MapConfig, SensorModel};
 use voxtile_local::LocalParameters;
 
+pub const DEFAULT_NODE_NAME: &str = "voxtile_ros2";
 const DEFAULT_INFLATION_M: f64 = 0.2;
 
 /// ROS 2 node that maps point clouds into a voxtile map. Lengths are in metres, times in seconds.
 // clap reads these fields as options, serde reads them as ROS parameters: names, types and limits are the same.
 #[derive(Clone, Debug, Parser, Serialize, Deserialize)]
 #[command(name = "voxtile-ros2", version, max_term_width = 80, args_override_self = true)]
+#[command(
+    after_help = "`voxtile-ros2 health [ADDRESS:]PORT` checks a node that runs with --metrics, by its exit code."
+)]
 pub struct Args {
     /// Map folder; created if missing, continued if it exists
     #[arg(short = 'o', long = "output", value_name = "MAP")]
+    #[serde(skip_serializing, default)]
     pub output: PathBuf,
     /// ROS 2 parameter file; command-line options override it, and later files override earlier ones
     #[arg(long, value_name = "FILE")]
+    #[serde(skip_serializing, default)]
     pub params_file: Vec<PathBuf>,
+    /// Start a new map from this OctoMap file (.bt .ot), with its resolution
+    #[arg(long, value_name = "FILE")]
+    #[serde(skip_serializing, default)]
+    pub octomap_path: Option<PathBuf>,
     /// Topic of clouds (sensor_msgs/PointCloud2); repeat it for each sensor
     #[arg(long, value_name = "TOPIC", default_value = "cloud_in")]
     #[serde(deserialize_with = "one_or_more")]
@@ -67,6 +80,24 @@ pub struct Args {
     /// Cut rays at this length
     #[arg(long, value_name = "M")]
     pub max_range: Option<f64>,
+    /// Ignore points with a smaller x in the map frame: neither hits nor free space
+    #[arg(long, value_name = "M", allow_negative_numbers = true)]
+    pub point_cloud_min_x: Option<f64>,
+    /// Ignore points with a larger x in the map frame
+    #[arg(long, value_name = "M", allow_negative_numbers = true)]
+    pub point_cloud_max_x: Option<f64>,
+    /// Ignore points with a smaller y in the map frame
+    #[arg(long, value_name = "M", allow_negative_numbers = true)]
+    pub point_cloud_min_y: Option<f64>,
+    /// Ignore points with a larger y in the map frame
+    #[arg(long, value_name = "M", allow_negative_numbers = true)]
+    pub point_cloud_max_y: Option<f64>,
+    /// Ignore points with a smaller z in the map frame
+    #[arg(long, value_name = "M", allow_negative_numbers = true)]
+    pub point_cloud_min_z: Option<f64>,
+    /// Ignore points with a larger z in the map frame
+    #[arg(long, value_name = "M", allow_negative_numbers = true)]
+    pub point_cloud_max_z: Option<f64>,
     /// Occupancy probability of a hit, for a new map [default: 0.7]
     #[arg(long, value_name = "P")]
     pub hit: Option<f64>,
@@ -126,7 +157,7 @@ pub struct Args {
     pub inflation_range: f64,
 
     /// Name of the node; also the prefix of some service names
-    #[arg(long, value_name = "NAME", default_value = "voxtile_ros2")]
+    #[arg(long, value_name = "NAME", default_value = DEFAULT_NODE_NAME)]
     pub node_name: String,
     /// Namespace of the node, prefixed to relative names
     #[arg(long, value_name = "NS", default_value = "/")]
@@ -143,6 +174,7 @@ pub struct Args {
     pub zenoh_router: Vec<String>,
     /// Zenoh configuration file (JSON5), instead of --zenoh-router and --network
     #[arg(long, value_name = "FILE", conflicts_with_all = ["zenoh_router", "network"])]
+    #[serde(skip_serializing, default)]
     pub zenoh_config: Option<PathBuf>,
     /// RMW implementation of service clients over DDS
     #[arg(long, value_enum, default_value_t = Rmw::Fastrtps)]
@@ -155,6 +187,17 @@ pub struct Args {
     /// Communicate with other machines; otherwise only over the loopback interface
     #[arg(long)]
     pub network: bool,
+
+    /// Serve /metrics (Prometheus) and /health over HTTP. A port alone is on the loopback interface
+    #[arg(long, value_name = "[ADDRESS:]PORT")]
+    pub metrics: Option<ListenAddress>,
+    /// Format of the log on standard error
+    #[arg(long, value_enum, default_value_t = LogFormat::Text)]
+    pub log_format: LogFormat,
+    /// Log each dropped cloud; -vv also logs waiting clouds and each tile read or written. RUST_LOG sets the level by
+    /// module
+    #[arg(short, long, action = clap::ArgAction::Count)]
+    pub verbose: u8,
 }
 
 /// Upper bound on durations, in seconds: almost 300 years, which fits nanoseconds in an `i64`.
@@ -240,6 +283,13 @@ impl Args {
         Names::new(&self.namespace, &self.node_name, &self.remap)
     }
 
+    /// Returns the absolute names of the topics of clouds. Invalid names are returned as given.
+    pub fn cloud_topics(&self) -> Vec<String> {
+        let names = self.names().ok();
+        let full = |topic: &String| names.as_ref().map_or_else(|| topic.clone(), |names| names.full(topic));
+        self.cloud.iter().map(full).collect()
+    }
+
     /// Returns the sensor model of a new map.
     ///
     /// # Errors
@@ -307,6 +357,29 @@ impl Args {
         let radius_m = self.projected_radius.unwrap_or(extent.radius_m);
         ensure!(radius_m > 0.0, "--projected-radius: {radius_m} is not a valid radius; give metres above 0");
         Ok(Extent { radius_m, ..extent })
+    }
+
+    /// Returns the box outside of which points are ignored, in the map frame.
+    ///
+    /// # Errors
+    ///
+    /// A minimum that is not below the maximum.
+    pub fn point_limits(&self) -> anyhow::Result<PointLimits> {
+        let limits = [
+            ("x", self.point_cloud_min_x, self.point_cloud_max_x),
+            ("y", self.point_cloud_min_y, self.point_cloud_max_y),
+            ("z", self.point_cloud_min_z, self.point_cloud_max_z),
+        ];
+        let mut box_m = [[0.0; 2]; 3];
+        for ((axis, min, max), limits_m) in limits.into_iter().zip(&mut box_m) {
+            let (min, max) = (min.unwrap_or(f64::NEG_INFINITY), max.unwrap_or(f64::INFINITY));
+            ensure!(
+                min < max,
+                "--point-cloud-min-{axis}: {min} must be below --point-cloud-max-{axis} ({max})"
+            );
+            *limits_m = [min, max];
+        }
+        Ok(PointLimits(box_m))
     }
 
     /// Returns the interval between publications.

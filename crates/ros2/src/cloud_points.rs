@@ -1,3 +1,4 @@
+use crate::point_limits::PointLimits;
 use voxtile::{Pose, ScanRef};
 use voxtile_formats::RigidPose;
 use voxtile_formats::ros::messages::PointCloud2;
@@ -29,6 +30,11 @@ impl CloudPoints {
             }
         }
         Self { positions_m, intensities }
+    }
+
+    /// Ignores points outside of the limits.
+    pub fn limit(&mut self, limits: &PointLimits, world_from_sensor: &RigidPose) {
+        limits.apply(&mut self.positions_m, world_from_sensor);
     }
 
     /// Returns the points as a scan.

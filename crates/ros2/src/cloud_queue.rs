@@ -44,6 +44,11 @@ impl CloudQueue {
         self.clouds.len()
     }
 
+    /// Returns the reserved memory.
+    pub fn bytes(&self) -> usize {
+        self.bytes
+    }
+
     /// Returns whether a cloud must wait outside the queue until memory is free.
     pub fn must_wait(&self, cloud: &Cloud) -> bool {
         let needed = self.bytes.saturating_add(bytes_of(cloud));
@@ -124,7 +129,8 @@ impl CloudQueue {
     }
 }
 
-fn bytes_of(cloud: &Cloud) -> usize {
+/// Returns the memory that a cloud reserves in the queue.
+pub fn bytes_of(cloud: &Cloud) -> usize {
     let own_bytes = cloud.cdr.capacity() + cloud.frame.capacity() + CLOUD_BYTES;
     own_bytes.saturating_add(cloud.points_bytes)
 }

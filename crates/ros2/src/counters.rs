@@ -3,6 +3,8 @@
 pub struct Counters {
     pub received: u64,
     pub mapped: u64,
+    /// Points of the mapped clouds, without those that were skipped.
+    pub points: u64,
     /// Clouds dropped because mapping was too slow.
     pub dropped_behind: u64,
     /// Clouds skipped by `thin`.

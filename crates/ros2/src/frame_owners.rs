@@ -1,6 +1,6 @@
 use crate::transport::Gid;
 use std::cmp::Reverse;
-use std::collections::{HashMap, HashSet};
+use std::collections::{BTreeSet, HashMap, HashSet};
 
 /// Publishers of child frames, in the order of their last transforms. Chooses the frames to drop when the buffer is
 /// full: a flood of frames from one publisher must not displace those of others.
@@ -44,6 +44,11 @@ impl FrameOwners {
 
     pub fn knows(&self, child: &str) -> bool {
         self.frames.contains_key(child)
+    }
+
+    /// Returns the names of all frames, sorted.
+    pub fn names(&self) -> BTreeSet<&str> {
+        self.frames.iter().flat_map(|(child, owned)| [child.as_str(), owned.parent.as_str()]).collect()
     }
 
     pub fn note(&mut self, parent: &str, child: &str, publisher: Option<Gid>, is_static: bool) {

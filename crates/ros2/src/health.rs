@@ -1,5 +1,6 @@
 use crate::latencies::Latencies;
-use std::time::Duration;
+use crate::refusal::Refusal;
+use std::time::{Duration, Instant, SystemTime};
 use voxtile::mapper::MapStatistics;
 
 /// State of the map, sampled by its mapper about once a second.
@@ -16,4 +17,13 @@ pub struct Health {
     /// Memory of the local map, not included in the statistics.
     pub local_map_bytes: usize,
     pub latencies: Latencies,
+    /// Number of successful background flushes.
+    pub flushes: u64,
+    pub failed_flushes: u64,
+    /// End and duration of the last successful background flush.
+    pub last_flush: Option<(SystemTime, Duration)>,
+    /// Last cloud that the map refused.
+    pub refused_at: Option<(Instant, Refusal)>,
+    /// Time of the sample.
+    pub sampled_at: Option<Instant>,
 }

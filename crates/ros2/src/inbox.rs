@@ -1,8 +1,9 @@
 use crate::args::Args;
 use crate::cloud::Cloud;
 use crate::cloud_points::CloudPoints;
-use crate::cloud_queue::CloudQueue;
+use crate::cloud_queue::{CloudQueue, bytes_of};
 use crate::counters::Counters;
+use crate::drop_warnings::DropWarnings;
 use crate::transform_buffer::TransformBuffer;
 use crate::transport::Message;
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
@@ -23,6 +24,9 @@ struct State {
     queue: CloudQueue,
     transforms: TransformBuffer,
     counters: Counters,
+    /// Topics of clouds, each with the number of received clouds.
+    arrived: Vec<(String, u64)>,
+    warnings: DropWarnings,
     /// Last received path, until it is taken.
     path: Option<Vec<StampedPose>>,
     fixed_frame: String,
@@ -34,20 +38,33 @@ impl Inbox {
         let queue = CloudQueue::new(args.queue_bytes(), args.cloud.len(), args.when_behind);
         let (transforms, counters) = (TransformBuffer::new(args), Counters::default());
         let fixed_frame = args.frame_id.trim_start_matches('/').to_owned();
-        let state = State { queue, transforms, counters, path: None, fixed_frame, is_closed: false };
-        let state = Mutex::new(state);
-        Self { state, changed: Condvar::new() }
+        let arrived = args.cloud_topics().into_iter().map(|topic| (topic, 0)).collect();
+        let warnings = DropWarnings::new(args);
+        let state = State {
+            queue,
+            transforms,
+            counters,
+            arrived,
+            warnings,
+            path: None,
+            fixed_frame,
+            is_closed: false,
+        };
+        Self { state: Mutex::new(state), changed: Condvar::new() }
     }
 
     pub fn put_cloud(&self, topic: usize, cdr: Vec<u8>) {
         let head = head(&cdr);
         let mut state = self.lock();
         state.counters.received += 1;
+        if let Some((_, arrived)) = state.arrived.get_mut(topic) {
+            *arrived += 1;
+        }
         let (header, points_bytes) = match head {
             Ok(head) => head,
             Err(error) => {
-                log::debug!("cannot decode a cloud: {error}");
                 state.counters.malformed += 1;
+                state.warnings.malformed_cloud(topic, &error);
                 return;
             }
         };
@@ -58,15 +75,20 @@ impl Inbox {
             state = self.changed.wait(state).unwrap_or_else(PoisonError::into_inner);
         }
         cloud.arrived = Instant::now();
-        let State { queue, counters, .. } = &mut *state;
+        let State { queue, counters, warnings, transforms, .. } = &mut *state;
+        let (before, bytes) = (*counters, bytes_of(&cloud));
         queue.push(cloud, counters);
+        if counters.too_large > before.too_large {
+            warnings.too_large_cloud(topic, bytes);
+        }
+        warnings.of_queue([&before, counters], || transforms.problem());
         self.changed.notify_all();
     }
 
     pub fn put_poses(&self, kind: MessageKind, message: &Message, is_static: bool) {
         let poses = decode_poses(kind, Wire::Cdr, &message.cdr);
         let mut state = self.lock();
-        let State { queue, transforms, counters, .. } = &mut *state;
+        let State { queue, transforms, counters, warnings, .. } = &mut *state;
         match poses {
             Ok(poses) => {
                 let now = Instant::now();
@@ -75,8 +97,8 @@ impl Inbox {
                 poses.iter().for_each(&mut insert);
             }
             Err(error) => {
-                log::debug!("cannot decode transforms: {error}");
                 counters.malformed += 1;
+                warnings.malformed_poses(&error);
             }
         }
         self.changed.notify_all();
@@ -95,8 +117,8 @@ impl Inbox {
                 state.counters.malformed += 1;
             }
             Err(error) => {
-                log::debug!("cannot decode a path: {error}");
                 state.counters.malformed += 1;
+                state.warnings.malformed_path(&error);
             }
         }
     }
@@ -115,6 +137,7 @@ impl Inbox {
             let State { queue, transforms, counters, .. } = &mut *state;
             let now = Instant::now();
             let taken = queue.take_ready(counters, |cloud| transforms.verdict(cloud, now));
+            transforms.warn_of_drops(now);
             if taken.is_some() {
                 self.changed.notify_all();
                 return taken;
@@ -125,6 +148,31 @@ impl Inbox {
             }
         }
         None
+    }
+
+    /// Counts messages that the transport lost.
+    pub fn note_lost(&self, messages: u64, why: &str) {
+        let mut state = self.lock();
+        state.counters.transport_errors += messages;
+        state.warnings.lost(messages, why);
+    }
+
+    /// Counts a message that is larger than the queue.
+    #[cfg(feature = "zenoh")]
+    pub fn note_too_large(&self, topic: &str, bytes: usize) {
+        let mut state = self.lock();
+        state.counters.too_large += 1;
+        state.warnings.too_large(topic, bytes);
+    }
+
+    /// Returns the topics of clouds, each with the number of received clouds.
+    pub fn arrived(&self) -> Vec<(String, u64)> {
+        self.lock().arrived.clone()
+    }
+
+    /// Returns the memory of the queued clouds.
+    pub fn queue_bytes(&self) -> usize {
+        self.lock().queue.bytes()
     }
 
     pub fn count(&self, count: impl FnOnce(&mut Counters)) {

@@ -3,21 +3,32 @@ use std::time::Duration;
 
 /// Times from arrival to completed mapping of the latest clouds.
 #[derive(Clone, Debug, Default)]
-pub struct Latencies(VecDeque<Duration>);
+pub struct Latencies {
+    last: VecDeque<Duration>,
+    /// Sum and number of all times.
+    all: (Duration, u64),
+}
 
 const MAX_COUNT: usize = 1000;
 
 impl Latencies {
     pub fn note(&mut self, latency: Duration) {
-        if self.0.len() >= MAX_COUNT {
-            self.0.pop_front();
+        if self.last.len() >= MAX_COUNT {
+            self.last.pop_front();
         }
-        self.0.push_back(latency);
+        self.last.push_back(latency);
+        let (sum, count) = self.all;
+        self.all = (sum.saturating_add(latency), count + 1);
+    }
+
+    /// Returns the sum and the number of the times of all clouds.
+    pub fn all(&self) -> (Duration, u64) {
+        self.all
     }
 
     /// Returns the latency that `percent` of the clouds do not exceed. `None` before the first cloud.
     pub fn percentile(&self, percent: usize) -> Option<Duration> {
-        let mut sorted: Vec<Duration> = self.0.iter().copied().collect();
+        let mut sorted: Vec<Duration> = self.last.iter().copied().collect();
         sorted.sort_unstable();
         let rank = (sorted.len() * percent).div_ceil(100).saturating_sub(1);
         sorted.get(rank).copied()

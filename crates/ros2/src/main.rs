@@ -7,32 +7,43 @@
 //! Transport -> corrected path -> Mapping -> Remapping   one thread per path, concurrent with mapping
 //! LiveMap -> messages -> Transport                   publishers: one thread
 //! Transport -> orders -> Mapping, queries -> LiveMap  services: one thread per service
+//! CloudQueue, LiveMap -> /metrics, /health           monitor: one thread, and one per request
 //! ```
 
 mod args;
+mod arrival_watch;
 mod clearing_rule;
 mod cloud;
 mod cloud_points;
 mod cloud_queue;
 mod corrections;
 mod counters;
+mod drop_warnings;
+mod first_map;
 mod frame_owners;
 mod health;
 mod inbox;
 mod latencies;
+mod listen_address;
 mod live_map;
 mod local_mapping;
 mod local_share;
+mod log_format;
+mod logging;
 mod mapping;
 mod messages;
+mod monitor;
 mod names;
 mod node;
 mod parameters;
 mod parent_warnings;
+mod point_limits;
+mod pose_miss;
 mod pose_watch;
 mod publishers;
 mod refusal;
 mod remapping;
+mod repeated;
 mod services;
 mod stamp_check;
 mod stop_signals;
@@ -43,22 +54,25 @@ mod when_behind;
 use args::Args;
 use inbox::Inbox;
 use mapping::Mapping;
+use monitor::MonitorServer;
+use parameters::{Parsed, Remark};
 use std::process::ExitCode;
 use std::sync::Arc;
 
 fn main() -> ExitCode {
     // Use one malloc arena, so that --memory holds: DDS and the mapper run many threads.
     voxtile::begin_with_one_heap();
-    // ros2-client logs an error when it counts the subscribers of a topic without any. The rustdds writer logs an error
-    // when a reader requests a message that a newer one has replaced; some readers repeat the request 100 times.
-    let filter = "info,rustdds=error,rustdds::rtps::writer=off,ros2_client=off";
-    env_logger::Builder::from_env(env_logger::Env::default().default_filter_or(filter)).init();
     let arguments: Vec<_> = std::env::args_os().collect();
-    let args = parameters::parse(&arguments).unwrap_or_else(|error| error.exit());
+    if let Some(code) = monitor::health_command(&arguments) {
+        return code;
+    }
+    let Parsed { args, remarks } = parameters::parse(&arguments).unwrap_or_else(|error| error.exit());
+    logging::begin(&args);
+    remarks.iter().for_each(Remark::log);
     match run(&args) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            eprintln!("voxtile-ros2: {error:#}");
+            logging::report(&error, args.log_format);
             ExitCode::FAILURE
         }
     }
@@ -67,10 +81,11 @@ fn main() -> ExitCode {
 fn run(args: &Args) -> anyhow::Result<()> {
     let stop = stop_signals::catch()?;
     let inbox = Arc::new(Inbox::new(args));
+    let server = args.metrics.map(MonitorServer::bind).transpose()?;
     // Open the map before the node appears on the network, so that a failure is reported first.
     let (orders, placed_orders) = services::orders();
     let mapping = Mapping::open(args, inbox.clone(), placed_orders)?;
-    let node = node::start(args, &inbox, mapping.live(), &orders)?;
+    let node = node::start(args, &inbox, mapping.live(), &orders, server)?;
     let outcome = mapping.run(&stop);
     inbox.close();
     node.end();

@@ -1,20 +1,23 @@
 use crate::args::Args;
 use crate::cloud::Cloud;
 use crate::cloud_points::CloudPoints;
+use crate::first_map;
 use crate::health::Health;
 use crate::inbox::Inbox;
 use crate::latencies::Latencies;
 use crate::live_map::LiveMap;
 use crate::local_mapping::LocalMapping;
+use crate::point_limits::PointLimits;
 use crate::refusal::Refusal;
 use crate::remapping::{self, Remapping};
+use crate::repeated::{Repeated, counted};
 use crate::services::{Order, PlacedOrder};
 use anyhow::ensure;
 use bytesize::ByteSize;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::mpsc::Receiver;
-use std::time::{Duration, Instant};
+use std::time::{Duration, Instant, SystemTime};
 use voxtile::operations::{self, OnlineRemap, Part};
 use voxtile::{
     Aabb, Clearing, Error, MapConfig, MapReader, MapView, Mapper, MemoryLimit, OutOfCoreTileMapper, Point,
@@ -31,6 +34,7 @@ pub struct Mapping {
     live: Arc<LiveMap>,
     local: LocalMapping,
     latencies: Latencies,
+    point_limits: PointLimits,
     orders: Receiver<PlacedOrder>,
     /// Save requests, each with the scan that must become durable.
     saves: Vec<(u64, PlacedOrder)>,
@@ -44,11 +48,14 @@ pub struct Mapping {
     path_tolerance_m: f64,
     flush_every: Duration,
     flushed_at: Instant,
-    /// Whether a flush was begun whose result is not known yet.
-    is_flush_begun: bool,
+    /// Start of a flush whose result is not known yet.
+    flush_begun_at: Option<Instant>,
+    /// Number of successful background flushes, and end and duration of the last one.
+    flushes: (u64, Option<(SystemTime, Duration)>),
     has_flush_failed: bool,
-    /// Time of the last warning about a refused cloud.
-    warned_at: Option<Instant>,
+    /// Warning about refused clouds.
+    refused: Repeated,
+    refused_at: Option<(Instant, Refusal)>,
     logged_at: Instant,
     sampled_at: Instant,
     /// Time when the map on disk was last complete or last updated by a flush, and the number of its last scan at that
@@ -86,6 +93,9 @@ impl Mapping {
             Ok(config) => {
                 // Keep the resolution and tile size of the existing map.
                 log::info!("continuing the map {}", args.output.display());
+                if let Some(file) = &args.octomap_path {
+                    log::info!("--octomap-path {} is ignored: the map exists", file.display());
+                }
                 ensure!(
                     config.keeps_scans || !is_followed,
                     "--path: the map {} has no kept scans and cannot follow a path; create a new map",
@@ -94,14 +104,25 @@ impl Mapping {
                 OutOfCoreTileMapper::open(&args.output, own(config))?
             }
             Err(Error::NoMap { .. }) => {
-                let config = match args.tile_size {
-                    Some(tile_size_m) => MapConfig::new(args.resolution, tile_size_m)?,
-                    None => MapConfig::with_resolution(args.resolution)?,
+                let new = |config: MapConfig| -> anyhow::Result<MapConfig> {
+                    let config = config.with_sensor_model(args.sensor_model()?);
+                    let config = config.with_clearing(args.clearing.map(Clearing::from));
+                    Ok(config.with_kept_scans(args.keep_scans || is_followed))
                 };
-                let config = config.with_sensor_model(args.sensor_model()?);
-                let config = config.with_clearing(args.clearing.map(Clearing::from));
-                let config = config.with_kept_scans(args.keep_scans || is_followed);
-                OutOfCoreTileMapper::create(&args.output, own(config))?
+                if let Some(file) = &args.octomap_path {
+                    ensure!(
+                        !args.keep_scans && !is_followed,
+                        "--octomap-path cannot be combined with --keep-scans or --path: its voxels are of no scan"
+                    );
+                    let config = first_map::create(file, &args.output, new)?;
+                    OutOfCoreTileMapper::open(&args.output, own(config))?
+                } else {
+                    let config = match args.tile_size {
+                        Some(tile_size_m) => MapConfig::new(args.resolution, tile_size_m)?,
+                        None => MapConfig::with_resolution(args.resolution)?,
+                    };
+                    OutOfCoreTileMapper::create(&args.output, own(new(config)?))?
+                }
             }
             Err(error) => return Err(error.into()),
         };
@@ -128,6 +149,7 @@ impl Mapping {
             live,
             local,
             latencies: Latencies::default(),
+            point_limits: args.point_limits()?,
             orders,
             saves: Vec::new(),
             path: None,
@@ -137,9 +159,11 @@ impl Mapping {
             path_tolerance_m: args.path_tolerance,
             flush_every,
             flushed_at: now,
-            is_flush_begun: false,
+            flush_begun_at: None,
+            flushes: (0, None),
             has_flush_failed: false,
-            warned_at: None,
+            refused: Repeated::default(),
+            refused_at: None,
             logged_at: now,
             sampled_at: now,
             durable,
@@ -200,8 +224,11 @@ impl Mapping {
         if self.mapper.is_flushing() {
             return Ok(());
         }
-        if std::mem::take(&mut self.is_flush_begun) {
+        if let Some(begun) = self.flush_begun_at.take() {
             let flushed = self.mapper.end_flush();
+            if flushed.is_ok() {
+                self.flushes = (self.flushes.0 + 1, Some((SystemTime::now(), begun.elapsed())));
+            }
             self.note_flush(&flushed);
             flushed.or_else(if_fatal)?;
         }
@@ -219,9 +246,10 @@ impl Mapping {
             self.note_flush(&Ok(()));
             return Ok(());
         }
+        let now = Instant::now();
         let begun = self.mapper.begin_flush();
         match begun {
-            Ok(()) => self.is_flush_begun = true,
+            Ok(()) => self.flush_begun_at = Some(now),
             Err(_) => self.note_flush(&begun),
         }
         begun.or_else(if_fatal)
@@ -409,6 +437,11 @@ impl Mapping {
             has_flush_failed: self.has_flush_failed,
             local_map_bytes: self.local.bytes(),
             latencies: self.latencies.clone(),
+            flushes: self.flushes.0,
+            failed_flushes: self.inbox.counters().0.failed_flushes,
+            last_flush: self.flushes.1,
+            refused_at: self.refused_at,
+            sampled_at: Some(Instant::now()),
         });
     }
 
@@ -420,16 +453,21 @@ impl Mapping {
     fn insert(&mut self, cloud: &Cloud, world_from_sensor: &RigidPose) -> voxtile::Result<()> {
         // The inbox decoded it before: it is complete, and memory for its points is reserved.
         let Ok(message) = PointCloud2::decode(Wire::Cdr, &cloud.cdr) else { return Ok(()) };
-        let points = CloudPoints::of(&message);
+        let mut points = CloudPoints::of(&message);
+        points.limit(&self.point_limits, world_from_sensor);
         let scan = points.scan(world_from_sensor, cloud.stamp_ns);
-        match scan.and_then(|scan| self.mapper.insert_points(&scan).map(|_| scan)) {
-            Ok(scan) => {
+        match scan.and_then(|scan| Ok((scan, self.mapper.insert_points(&scan)?))) {
+            Ok((scan, report)) => {
                 // Update the local map before `note_scan`: publishers send each version once.
                 self.local.insert(&scan);
                 let (scan_number, sensor_m) = (self.mapper.scan_number(), world_from_sensor.position_m);
                 self.live.note_scan(scan_number, sensor_m, cloud.stamp_ns);
                 self.latencies.note(cloud.arrived.elapsed());
-                self.inbox.count(|counters| counters.mapped += 1);
+                let points = report.points.saturating_sub(report.skipped.total());
+                self.inbox.count(|counters| {
+                    counters.mapped += 1;
+                    counters.points += points;
+                });
                 Ok(())
             }
             Err(error) => self.refuse(error),
@@ -440,12 +478,11 @@ impl Mapping {
     fn refuse(&mut self, error: Error) -> voxtile::Result<()> {
         let Some(refusal) = Refusal::of(&error) else { return Err(error) };
         self.inbox.count(|counters| refusal.count(counters));
-        // Limit the rate of warnings: each cloud may fail for the same reason.
-        if self.warned_at.is_none_or(|at| at.elapsed() >= SAMPLE_EVERY) {
-            log::warn!("cloud refused: {error:#}");
-            self.warned_at = Some(Instant::now());
-        } else {
-            log::debug!("cloud refused: {error:#}");
+        self.refused_at = Some((Instant::now(), refusal));
+        // Each cloud may fail for the same reason.
+        match self.refused.note(1, Instant::now()) {
+            Some(count) => log::warn!("{} refused: {error:#}", counted(count, "cloud")),
+            None => log::debug!("cloud refused: {error:#}"),
         }
         Ok(())
     }

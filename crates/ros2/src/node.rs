@@ -1,17 +1,18 @@
 use crate::args::Args;
+use crate::arrival_watch::ArrivalWatch;
 use crate::inbox::Inbox;
 use crate::live_map::LiveMap;
-use crate::publishers::Publishing;
+use crate::monitor::{Monitor, MonitorServer};
+use crate::publishers::{PUBLISHED_CLOUDS, Publishing};
 use crate::services::{self, Orders};
-use crate::transport::{Message, Qos, Transport, TypeName};
-use anyhow::Context as _;
+use crate::transport::{Message, Qos, Transport, TypeName, spawn};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
 use voxtile_formats::ros::messages::MessageKind;
 
 pub struct RunningNode {
-    publishing: JoinHandle<()>,
+    threads: Vec<JoinHandle<()>>,
     stop: Arc<AtomicBool>,
     transport: Transport,
 }
@@ -20,8 +21,11 @@ impl RunningNode {
     /// Stops publishing and leaves the graph.
     pub fn end(self) {
         self.stop.store(true, Ordering::Relaxed);
-        if self.publishing.join().is_err() {
-            log::error!("the publisher thread panicked");
+        for thread in self.threads {
+            let name = thread.thread().name().unwrap_or_default().to_owned();
+            if thread.join().is_err() {
+                log::error!("the thread {name} panicked");
+            }
         }
         self.transport.leave();
     }
@@ -37,6 +41,7 @@ pub fn start(
     inbox: &Arc<Inbox>,
     map: Arc<LiveMap>,
     orders: &Orders,
+    server: Option<MonitorServer>,
 ) -> anyhow::Result<RunningNode> {
     let mut transport = Transport::join(args, inbox)?;
     let volatile = Qos::best_effort(5);
@@ -68,15 +73,21 @@ pub fn start(
             Box::new(move |message: Message| to.put_path(&message.cdr)),
         )?;
     }
-    let names = args.names()?;
-    let clouds: Vec<String> = args.cloud.iter().map(|topic| names.full(topic)).collect();
-    log::info!("subscribed to {} in domain {}", clouds.join(", "), args.domain_id);
+    log::info!("subscribed to {} in domain {}", args.cloud_topics().join(", "), args.domain_id);
     services::start(args, &mut transport, &map, orders)?;
-    let mut publishing = Publishing::new(args, &mut transport, inbox.clone(), map)?;
+    let mut publishing = Publishing::new(args, &mut transport, inbox.clone(), map.clone())?;
+    let arrivals = ArrivalWatch::new(args, inbox.clone(), transport.graph(), &PUBLISHED_CLOUDS)?;
     let stop = Arc::new(AtomicBool::new(false));
-    let thread_stop = stop.clone();
-    let thread = std::thread::Builder::new().name("publisher".to_owned());
-    let publishing =
-        thread.spawn(move || publishing.run(&thread_stop)).context("cannot start the publisher thread")?;
-    Ok(RunningNode { publishing, stop, transport })
+    let (of_publishing, of_arrivals) = (stop.clone(), stop.clone());
+    let mut threads = vec![
+        spawn("publisher", move || publishing.run(&of_publishing))?,
+        spawn("arrivals", move || arrivals.run(&of_arrivals))?,
+    ];
+    if let Some(server) = server {
+        let memory_limit_bytes = args.memory.as_u64();
+        let monitor = Arc::new(Monitor { inbox: inbox.clone(), map, memory_limit_bytes });
+        let of_server = stop.clone();
+        threads.push(spawn("monitoring", move || server.run(monitor, &of_server))?);
+    }
+    Ok(RunningNode { threads, stop, transport })
 }

@@ -65,6 +65,11 @@ impl StampCheck {
         self.children.iter().filter_map(|(child, known)| Some((child.as_str(), known.off_since?)))
     }
 
+    /// Returns the newest accepted stamp of a frame.
+    pub fn newest_ns(&self, child: &str) -> Option<i64> {
+        self.children.get(child)?.newest_ns
+    }
+
     pub fn forget(&mut self, child: &str) {
         self.children.remove(child);
     }

@@ -4,7 +4,8 @@ use crate::cloud_queue::{CloudQueue, Verdict};
 use crate::counters::Counters;
 use crate::frame_owners::FrameOwners;
 use crate::parent_warnings::ParentWarnings;
-use crate::pose_watch::PoseWatch;
+use crate::pose_miss::PoseMiss;
+use crate::pose_watch::{Missed, PoseWatch};
 use crate::stamp_check::{StampCheck, StampVerdict};
 use crate::transport::Gid;
 use std::collections::{HashMap, HashSet};
@@ -21,6 +22,8 @@ pub struct TransformBuffer {
     stamps: StampCheck,
     fixed_frame: String,
     max_wait: Duration,
+    /// Topics of transforms, for messages.
+    sources: String,
     /// Number of samples inserted since old ones were last removed, and number of samples left by that removal.
     samples: (usize, usize),
     owners: FrameOwners,
@@ -53,11 +56,12 @@ impl TransformBuffer {
             stamps: StampCheck::default(),
             fixed_frame: bare(&args.frame_id).to_owned(),
             max_wait: args.transform_wait,
+            sources: format!("{} and /tf_static", args.odometry.as_deref().unwrap_or("/tf")),
             samples: (0, 0),
             owners: FrameOwners::default(),
             sensors: HashMap::new(),
             parents: ParentWarnings::default(),
-            watch: PoseWatch::default(),
+            watch: PoseWatch::new(args.cloud_topics()),
             refused_at: None,
         }
     }
@@ -171,19 +175,34 @@ impl TransformBuffer {
             Err(why) => why,
         };
         let may_pass = !matches!(why, WhyNot::AlreadyFixed(_));
-        let missed = || {
-            format!("{} (a cloud of {} in {})", printable(&why), cloud.frame.escape_debug(), self.fixed_frame)
-        };
-        if let Some(warning) = self.watch.note_missed(cloud.topic, now, may_pass, missed) {
-            log::warn!("{warning}{}", remedy(&why));
-        }
         // Transforms may arrive late and out of order.
-        if may_pass && now.saturating_duration_since(cloud.arrived) < self.max_wait {
-            log::trace!("a cloud of {} is waiting: {why}", cloud.frame);
+        let is_dropped = !may_pass || now.saturating_duration_since(cloud.arrived) >= self.max_wait;
+        let missed = Missed { topic: cloud.topic, may_pass, is_dropped };
+        let miss = PoseMiss {
+            why: &why,
+            cloud,
+            map_frame: &self.fixed_frame,
+            owners: &self.owners,
+            stamps: &self.stamps,
+            sources: &self.sources,
+            max_wait: self.max_wait,
+        };
+        if let Some(warning) = self.watch.note_missed(missed, now, || miss.to_string()) {
+            log::warn!("{warning}");
+        }
+        if !is_dropped {
+            log::trace!("a cloud of {} is waiting: {why}", cloud.frame.escape_debug());
             return Verdict::Waits;
         }
-        log::debug!("cloud dropped without a pose in {}: {why}", self.fixed_frame);
+        log::debug!("cloud dropped without a pose in {}: {}", self.fixed_frame, printable(&why));
         Verdict::Expired
+    }
+
+    /// Warns of clouds that were dropped without a pose, if a warning is due.
+    pub fn warn_of_drops(&mut self, now: Instant) {
+        if let Some(warning) = self.watch.warning(now) {
+            log::warn!("{warning}");
+        }
     }
 
     /// Returns the reasons for which clouds get no poses, if they persist.
@@ -227,17 +246,6 @@ impl TransformBuffer {
 /// Escapes control characters in received names.
 fn printable(why: &dyn std::fmt::Display) -> String {
     why.to_string().escape_debug().to_string()
-}
-
-/// Returns additional advice for clouds without a pose, or an empty string.
-fn remedy(why: &WhyNot) -> &'static str {
-    match why {
-        WhyNot::AlreadyFixed(_) => {
-            ". Publish clouds in the sensor frame with its transforms, or set --frame-id to a frame in which \
-             the sensor moves"
-        }
-        _ => "",
-    }
 }
 
 /// Removes leading slashes from a frame name: tf 1 has them, tf 2 does not.
@@ -536,7 +544,8 @@ mod tests {
             buffer.problem()
         };
         assert_eq!((problem_after(0), problem_after(2)), (None, None));
-        let why = "no cloud gets a pose: no transform names the frame map (a cloud of lidar in map)";
+        let why = "no cloud gets a pose: no transform from \"lidar\" to \"map\": no transform names the frame map; \
+                   frames known: base, lidar";
         assert_eq!(problem_after(4).as_deref(), Some(why));
     }
 

@@ -50,6 +50,16 @@ impl Drop for Held {
 }
 
 impl AnswerMemory {
+    /// Returns the memory of the large responses in flight.
+    pub fn bytes(&self) -> usize {
+        self.0.lock().bytes
+    }
+
+    /// Returns the budget.
+    pub const fn limit_bytes() -> usize {
+        MAX_BYTES
+    }
+
     /// Reserves memory for a response on a connection. Returns `None` if responses to its client or to all clients use
     /// too much. A response larger than the budget is sent if there is no other.
     pub fn hold(&self, connection: &Connection, bytes: Bytes) -> Option<Bytes> {

@@ -105,6 +105,11 @@ impl Connections {
         connection
     }
 
+    /// Returns the number of open connections.
+    pub fn count(&self) -> usize {
+        self.open.lock().count
+    }
+
     fn now_ms(&self) -> u64 {
         u64::try_from(self.since.elapsed().as_millis()).unwrap_or(u64::MAX)
     }

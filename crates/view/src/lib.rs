@@ -6,6 +6,7 @@
 //!                      memory of responses in flight                answer_memory
 //!         -> Route     parsing of paths                             route, token
 //!         -> answers   JSON of a query, a tileset, bytes of a node  answers
+//!         -> metrics   text for Prometheus                          view_metrics
 //!            ServedMap one map that another process may write       served_map
 //!            MapState  one state of it: a flush or a snapshot       map_state, node_cache
 //! ```
@@ -25,6 +26,7 @@ mod served_map;
 mod server;
 mod token;
 mod view;
+mod view_metrics;
 mod work;
 
 pub use view::{Progress, View, ViewOptions};

@@ -53,6 +53,10 @@ impl Answer {
         Self::new(JSON, gzip(value.to_string().as_bytes()), Keep::No)
     }
 
+    pub fn metrics(text: &str) -> Self {
+        Self::new(voxtile_monitoring::CONTENT_TYPE, gzip(text.as_bytes()), Keep::No)
+    }
+
     pub fn node(gzip: Vec<u8>, keep: Keep) -> Self {
         Self::new("application/octet-stream", gzip, keep)
     }

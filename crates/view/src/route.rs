@@ -12,6 +12,7 @@ pub enum Route {
     Slash,
     Maps,
     Events,
+    Metrics,
     Of(MapId, Thing),
 }
 
@@ -57,6 +58,7 @@ impl Route {
             "licences.txt" => return Some(Self::Page("licences.txt")),
             "maps.json" => return Some(Self::Maps),
             "events" => return Some(Self::Events),
+            "metrics" => return Some(Self::Metrics),
             _ => {}
         }
         let (id, thing) = rest.strip_prefix("maps/")?.split_once('/')?;
@@ -151,6 +153,7 @@ mod tests {
         assert_eq!(route("/sesame_42/", None), Some(Route::Page("index.html")));
         assert_eq!(route("/sesame_42", None), Some(Route::Slash));
         assert_eq!(route("/sesame_42/maps.json", None), Some(Route::Maps));
+        assert_eq!(route("/sesame_42/metrics", None), Some(Route::Metrics));
         let now = MapId { number: 1, at: At::Now, since: None };
         assert_eq!(
             route("/sesame_42/maps/1/tileset.json", None),
@@ -177,6 +180,7 @@ mod tests {
             "/sesame_42x/",
             "/sesame_4/maps.json",
             "/maps.json",
+            "/metrics",
             "/sesame_42//etc/passwd",
             "/sesame_42/../../etc/passwd",
             "/sesame_42/maps/0/../../../etc/passwd",

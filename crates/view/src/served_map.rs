@@ -118,6 +118,13 @@ impl ServedMap {
         self.now.read().clone()
     }
 
+    /// Returns the time of the last flush by any process; `None` for OctoMap files, snapshots and maps in a bucket.
+    pub fn flushed_at(&self) -> Option<SystemTime> {
+        let log = self.at.map.join("commits.log");
+        let is_current = self.at.snapshot.is_none() && matches!(self.now().map, AnyMap::Map(_));
+        is_current.then(|| std::fs::metadata(log).ok()?.modified().ok())?
+    }
+
     /// Returns the snapshots that can be shown; none if the map itself was opened as a snapshot.
     pub fn snapshots(&self) -> Arc<Vec<Listed>> {
         let is_map = self.at.snapshot.is_none() && matches!(self.now().map, AnyMap::Map(_));

@@ -5,6 +5,7 @@ use super::response::{Answer, Body, Keep, empty};
 use super::route::{Route, version_in};
 use super::served_map::{Makes, ServedMap};
 use super::token::Token;
+use super::view_metrics::{Responses, metrics};
 use super::work::Work;
 use super::{answers, page};
 use bytes::Bytes;
@@ -48,6 +49,8 @@ pub struct Server {
     /// Builds levels of snapshots, one at a time on all cores. This takes seconds, so it must not block other work.
     making: Work,
     memory: AnswerMemory,
+    connections: Connections,
+    responses: Responses,
 }
 
 impl Server {
@@ -60,7 +63,8 @@ impl Server {
         let threads = std::thread::available_parallelism().map_or(2, usize::from);
         let id = format!("{:016x}", RandomState::new().build_hasher().finish());
         let (work, making, memory) = (Work::new(threads), Work::new(1), AnswerMemory::default());
-        Self { id, maps, token, address, changed, work, making, memory }
+        let (connections, responses) = (Connections::new(), Responses::default());
+        Self { id, maps, token, address, changed, work, making, memory, connections, responses }
     }
 
     pub fn run(self, listener: TcpListener) -> anyhow::Result<()> {
@@ -81,7 +85,6 @@ impl Server {
     }
 
     async fn accept(self: Arc<Self>, listener: tokio::net::TcpListener) {
-        let connections = Connections::new();
         loop {
             let (stream, address) = match listener.accept().await {
                 Ok(accepted) => accepted,
@@ -92,7 +95,7 @@ impl Server {
                     continue;
                 }
             };
-            let connection = Arc::new(connections.enter(Client::of(address.ip())));
+            let connection = Arc::new(self.connections.enter(Client::of(address.ip())));
             let mut stream = TimeoutStream::new(stream);
             stream.set_write_timeout(Some(WRITE_TIMEOUT));
             let stream = ClientStream::new(Box::pin(stream), connection.clone());
@@ -120,7 +123,8 @@ impl Server {
 
     async fn answer(self: Arc<Self>, request: Request<Incoming>, connection: &Connection) -> Response<Body> {
         connection.set_busy(true);
-        let response = self.response(request, connection).await;
+        let response = self.clone().response(request, connection).await;
+        self.responses.count(response.status());
         connection.set_busy(false);
         connection.note_progress();
         response
@@ -203,6 +207,13 @@ impl Server {
                 },
                 None => Answer::error(StatusCode::NOT_FOUND, "no such file"),
             };
+        }
+        if route == Route::Metrics {
+            let server = self.clone();
+            let metrics =
+                move || metrics(&server.maps, &server.responses, &server.connections, &server.memory);
+            let text = self.work.run(metrics).await;
+            return text.map_or_else(ending, |text| Answer::metrics(&text));
         }
         let Route::Of(id, thing) = route else {
             let server = self.clone();

@@ -56,6 +56,7 @@ impl View {
     ///
     /// Fails if a map cannot be opened, the token is invalid, or the address is not available.
     pub fn open(options: &ViewOptions) -> anyhow::Result<Self> {
+        voxtile_monitoring::note_start();
         let token = match &options.token {
             Some(token) => Token::new(token)?,
             None => Token::random()?,

@@ -142,3 +142,25 @@ fn quiet_and_verbose_exclude_each_other() {
     assert_eq!((code, out.as_str()), (2, ""));
     assert!(text_out.contains("cannot be used with"), "{text_out}");
 }
+
+#[test]
+fn the_log_and_errors_can_be_json() {
+    let folder = TempDir::new().unwrap();
+    let (source, map) = (scans(&folder), folder.path().join("map"));
+    let case = case(&["-v", "--log-format", "json"], None, [true, false]);
+    let (_, log) = build(&source, &map, &case);
+    let records = |log: &str| -> Vec<serde_json::Value> {
+        log.lines().map(|line| serde_json::from_str(line).unwrap_or_else(|_| panic!("{line}"))).collect()
+    };
+    let found = records(&log);
+    let is_flush = |record: &serde_json::Value| {
+        record["level"] == "info" && record["message"].as_str().unwrap().contains("flush 1")
+    };
+    assert!(found.iter().any(is_flush), "{log}");
+    let (code, _, log) = run(&["view", "no_such_map", "--no-browser"], &case);
+    let found = records(&log);
+    let [error] = &*found else { panic!("{log}") };
+    assert_eq!((code, &error["level"], &error["target"]), (1, &"error".into(), &"voxtile".into()));
+    assert!(error["message"].as_str().unwrap().contains("no_such_map"), "{log}");
+    assert!(error["time"].as_str().unwrap().ends_with('Z'), "{log}");
+}

@@ -245,6 +245,56 @@ fn the_server_shows_the_map() {
 }
 
 #[test]
+fn metrics_need_the_token_and_follow_the_map() {
+    let (folder, map) = a_map();
+    let viewer = Viewer::ready(&[&map], &folder.path().join("cache"));
+    let metrics = || {
+        let reply = viewer.get("metrics");
+        assert!(reply.status == 200 && reply.head.contains("text/plain; version=0.0.4"), "{}", reply.head);
+        String::from_utf8(reply.body).unwrap()
+    };
+    let value = |text: &str, sample: &str| -> f64 {
+        let line = text.lines().find(|line| line.starts_with(&format!("{sample} ")));
+        line.unwrap_or_else(|| panic!("no {sample}: {text}")).rsplit(' ').next().unwrap().parse().unwrap()
+    };
+    let text = metrics();
+    let described = &viewer.json("maps.json")["maps"][0];
+    let folder_name = map.file_name().unwrap().to_str().unwrap();
+    let of_map = format!("{{map=\"0\",name=\"{folder_name}\"}}");
+    for (name, key) in [("voxtile_map_scans", "scans"), ("voxtile_map_tiles", "tiles")] {
+        assert_eq!(Some(value(&text, &format!("{name}{of_map}"))), described[key].as_f64());
+    }
+    let disk_bytes = value(&text, &format!("voxtile_map_disk_bytes{of_map}"));
+    let folders = fs::read_dir(&map).unwrap().map(|entry| entry.unwrap().path()).filter(|path| path.is_dir());
+    let files = folders.flat_map(|folder| fs::read_dir(folder).unwrap());
+    let on_disk: u64 = files.map(|entry| entry.unwrap().metadata().unwrap().len()).sum();
+    assert!(disk_bytes > 0.0 && disk_bytes <= on_disk as f64, "{disk_bytes} {on_disk}");
+    let flushed_s = value(&text, &format!("voxtile_map_last_flush_timestamp_seconds{of_map}"));
+    let now_s = std::time::UNIX_EPOCH.elapsed().unwrap().as_secs_f64();
+    assert!((now_s - 600.0..=now_s).contains(&flushed_s), "{flushed_s}");
+    assert!(value(&text, "voxtile_http_connections") >= 1.0);
+    // Each sample follows the help and the type of its metric.
+    let mut name = "";
+    for line in text.lines() {
+        match line.strip_prefix("# ").and_then(|line| line.split_once(' ')) {
+            Some(("HELP", rest)) => name = rest.split(' ').next().unwrap(),
+            Some(("TYPE", rest)) => {
+                assert!(rest.starts_with(name) && (rest.ends_with(" counter") == name.ends_with("_total")))
+            }
+            _ => assert!(line.starts_with(name), "{line}"),
+        }
+    }
+    let before = value(&text, "voxtile_http_responses_total{code=\"200\"}");
+    assert_eq!(viewer.get("no_such_file").status, 404);
+    let text = metrics();
+    assert!(value(&text, "voxtile_http_responses_total{code=\"200\"}") > before);
+    assert_eq!(value(&text, "voxtile_http_responses_total{code=\"404\"}"), 1.0);
+    let without_token =
+        format!("GET /metrics HTTP/1.1\r\nhost: {}\r\nconnection: close\r\n\r\n", viewer.address);
+    assert_eq!(viewer.send(&without_token).status, 404);
+}
+
+#[test]
 fn octomap_files_and_several_maps_are_shown() {
     let (folder, map) = a_map();
     let file = folder.path().join("walls.bt");

@@ -4,6 +4,7 @@ use crate::services::{Orders, orders};
 use clap::Parser;
 use testkit::faulty_disk::{Fault, FaultyDisk};
 use voxtile::MapPath;
+use voxtile::SensorModel;
 use voxtile::query::Queries;
 
 /// Sensor position; `FAR` is in another tile.
@@ -189,4 +190,68 @@ fn a_waiting_path_is_dropped_by_a_revert() {
     request.join().unwrap().unwrap();
     mapping.map(NEAR);
     assert_eq!((mapping.mapper.scan_number(), mapping.awaits_flush()), (2, false));
+}
+
+#[test]
+fn points_outside_of_the_limits_are_neither_hits_nor_free() {
+    let folder = tempfile::tempdir().unwrap();
+    let (mut mapping, _) = open(folder.path(), &["--point-cloud-min-z", "-0.5", "--point-cloud-max-x", "3"]);
+    let pose = RigidPose { position_m: NEAR, quaternion: [0.0, 0.0, 0.0, 1.0] };
+    // Only the first point is inside.
+    mapping.insert(&cloud(vec![[2.0, 0.0, 0.0], [0.0, 2.0, -1.0], [4.0, 0.5, 0.0]]), &pose).unwrap();
+    let counters = mapping.inbox.counters().0;
+    assert_eq!((counters.mapped, counters.points), (1, 1));
+    let known = |map: &Mapping, point_m| map.mapper.occupancy_at(point_m).unwrap();
+    assert!(known(&mapping, [2.05, 0.05, 0.05]).is_occupied());
+    for unknown in [[0.05, 2.05, -0.95], [0.05, 1.05, -0.45], [4.05, 0.55, 0.05], [2.55, 0.35, 0.05]] {
+        assert!(known(&mapping, unknown).is_unknown(), "{unknown:?}");
+    }
+}
+
+#[test]
+fn a_new_map_starts_from_an_octomap_file() {
+    use voxtile::octree::{Octree, write_bt};
+    use voxtile::space::VoxelKey;
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("hall.bt");
+    let mut tree = Octree::new();
+    tree.set(VoxelKey::from_index([100, 0, 0]).morton(), 3.5);
+    tree.set(VoxelKey::from_index([-300, 7, 0]).morton(), -2.0);
+    write_bt(&tree, 0.2, 0.0, &mut std::fs::File::create(&file).unwrap()).unwrap();
+    let options = ["--octomap-path", file.to_str().unwrap(), "--hit", "0.9"];
+    let (mut mapping, _) = open(folder.path(), &options);
+    let state = |map: &Mapping, point_m| map.mapper.occupancy_at(point_m).unwrap();
+    let is_read =
+        |map: &Mapping| state(map, [20.1, 0.1, 0.1]).is_occupied() && state(map, [-59.9, 1.5, 0.1]).is_free();
+    assert!(is_read(&mapping));
+    // The resolution is that of the file, the sensor model that of the options.
+    assert_eq!(mapping.mapper.config().grid.resolution_m(), 0.2);
+    let SensorModel::LogOdds(model) = mapping.mapper.config().sensor_model else { panic!("another model") };
+    assert!((model.hit - 9_f64.ln()).abs() < 1e-9);
+    mapping.map(NEAR);
+    mapping.mapper.flush().unwrap();
+    drop(mapping);
+    // An existing map is continued.
+    std::fs::write(&file, "changed").unwrap();
+    let (mapping, _) = open(folder.path(), &options);
+    assert!(is_read(&mapping) && mapping.mapper.scan_number() == 1);
+}
+
+#[test]
+fn a_wrong_octomap_file_creates_no_map() {
+    let folder = tempfile::tempdir().unwrap();
+    let (map, file) = (folder.path().join("map"), folder.path().join("hall.bt"));
+    let error = |options: &[&str]| {
+        let own = ["voxtile-ros2", "-o", map.to_str().unwrap(), "--octomap-path", file.to_str().unwrap()];
+        let args = Args::parse_from(own.iter().chain(options));
+        let (_, placed) = orders();
+        Mapping::open(&args, Arc::new(Inbox::new(&args)), placed).err().map(|error| format!("{error:#}"))
+    };
+    assert!(error(&[]).unwrap().contains("hall.bt"));
+    std::fs::write(&file, "# Octomap OcTree binary file\nid OcTree\nsize 9\nres 0.1\ndata\n").unwrap();
+    assert!(error(&[]).unwrap().contains("hall.bt"));
+    assert!(
+        error(&["--keep-scans"]).unwrap().contains("--octomap-path cannot be combined with --keep-scans")
+    );
+    assert!(!map.exists());
 }

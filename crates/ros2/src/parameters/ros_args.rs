@@ -1,3 +1,4 @@
+use super::remark::Remark;
 use crate::names::RULE_SEPARATOR;
 use std::ffi::OsString;
 
@@ -8,6 +9,7 @@ pub struct RosArgs {
     pub arguments: Vec<OsString>,
     /// Names and YAML values of parameters.
     pub parameters: Vec<[String; 2]>,
+    pub remarks: Vec<Remark>,
 }
 
 const BEGIN: &str = "--ros-args";
@@ -81,7 +83,9 @@ impl RosArgs {
                 }
             },
             "--params-file" => options.push(format!("--params-file={value}")),
-            known if WITHOUT_EFFECT.contains(&known) => log::warn!("{known} {value} has no effect"),
+            known if WITHOUT_EFFECT.contains(&known) => {
+                self.remarks.push(Remark::warning(format!("{known} {value} has no effect")));
+            }
             unknown => return Err(format!("{BEGIN}: unknown argument {unknown}")),
         }
         Ok(())

@@ -24,4 +24,4 @@ mod voxel_changes;
 
 pub use extent::Extent;
 pub use octomap::octomap;
-pub use publishing::Publishing;
+pub use publishing::{PUBLISHED_CLOUDS, Publishing};

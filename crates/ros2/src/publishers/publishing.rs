@@ -35,6 +35,14 @@ pub struct Publishing {
     diagnosing: Diagnosing,
 }
 
+/// Topics of clouds that the node publishes.
+pub const PUBLISHED_CLOUDS: [&str; 4] = [CENTERS, CHANGES, LOCAL_OCCUPIED, LOCAL_INFLATED];
+const MARKERS: &str = "occupied_cells_vis_array";
+const PROJECTED_MAP: &str = "projected_map";
+const CENTERS: &str = "octomap_point_cloud_centers";
+const CHANGES: &str = "octomap_point_cloud_changes";
+const LOCAL_OCCUPIED: &str = "local_occupied";
+const LOCAL_INFLATED: &str = "local_inflated";
 /// Interval between checks of the stop flag.
 const POLL_EVERY: Duration = Duration::from_millis(20);
 
@@ -56,20 +64,12 @@ impl Publishing {
             projected: args.projected_extent()?,
             octomap_binary: Outlet::new(transport, "octomap_binary", octomap)?,
             octomap_full: Outlet::new(transport, "octomap_full", octomap)?,
-            centers: Outlet::new(transport, "octomap_point_cloud_centers", cloud)?,
-            markers: Outlet::new(
-                transport,
-                "occupied_cells_vis_array",
-                TypeName::new("visualization_msgs", "MarkerArray"),
-            )?,
-            projected_map: Outlet::new(
-                transport,
-                "projected_map",
-                TypeName::new("nav_msgs", "OccupancyGrid"),
-            )?,
-            local_occupied: Outlet::new(transport, "local_occupied", cloud)?,
-            local_inflated: Outlet::new(transport, "local_inflated", cloud)?,
-            changing: Changing::new(transport, "octomap_point_cloud_changes")?,
+            centers: Outlet::new(transport, CENTERS, cloud)?,
+            markers: Outlet::new(transport, MARKERS, TypeName::new("visualization_msgs", "MarkerArray"))?,
+            projected_map: Outlet::new(transport, PROJECTED_MAP, TypeName::new("nav_msgs", "OccupancyGrid"))?,
+            local_occupied: Outlet::new(transport, LOCAL_OCCUPIED, cloud)?,
+            local_inflated: Outlet::new(transport, LOCAL_INFLATED, cloud)?,
+            changing: Changing::new(transport, CHANGES)?,
             diagnosing: Diagnosing::new(transport, &args.node_name)?,
             inbox,
             map,
@@ -111,5 +111,37 @@ impl Publishing {
         let around = self.projected.around(moment.sensor_m);
         self.projected_map
             .refresh(version, || projected_map(&map.view(), &around, &self.projected, header()));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde_json::Value;
+
+    #[test]
+    fn layouts_show_published_topics() {
+        let assert_is_published = |topic: &str| {
+            let published = [MARKERS, PROJECTED_MAP, CENTERS, CHANGES, LOCAL_OCCUPIED, LOCAL_INFLATED];
+            assert!(topic.strip_prefix('/').is_some_and(|name| published.contains(&name)), "{topic}");
+        };
+        let foxglove: Value =
+            serde_json::from_str(include_str!("../../layouts/voxtile.foxglove.json")).unwrap();
+        let panels = &foxglove["configById"];
+        for panel in ["first", "second"] {
+            assert!(panels[foxglove["layout"][panel].as_str().unwrap()].is_object(), "{panel}");
+        }
+        let shown = panels["3D!voxtile"]["topics"].as_object().unwrap();
+        shown.keys().for_each(|topic| assert_is_published(topic));
+        let rviz: Value = serde_saphyr::from_str(include_str!("../../layouts/voxtile.rviz")).unwrap();
+        let displays = rviz["Visualization Manager"]["Displays"].as_array().unwrap();
+        let topics: Vec<&Value> =
+            displays.iter().map(|display| &display["Topic"]).filter(|topic| topic.is_object()).collect();
+        assert_eq!(topics.len(), 4);
+        for topic in topics {
+            assert_is_published(topic["Value"].as_str().unwrap());
+            // Volatile subscriptions would miss the last message.
+            assert_eq!(topic["Durability Policy"], "Transient Local");
+        }
     }
 }

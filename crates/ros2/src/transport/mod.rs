@@ -6,6 +6,7 @@
 //! ```
 
 mod dds;
+mod graph;
 mod message;
 mod qos;
 mod sender;
@@ -16,9 +17,11 @@ mod type_name;
 #[cfg(feature = "zenoh")]
 mod zenoh;
 
+pub use graph::{Graph, Published};
 pub use message::{Gid, Message};
 pub use qos::Qos;
 pub use sender::Sender;
+pub use threads::spawn;
 pub use transport_name::TransportName;
 pub use transport_node::Transport;
 pub use type_name::TypeName;

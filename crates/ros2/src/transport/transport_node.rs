@@ -1,7 +1,7 @@
 use super::dds::DdsNode;
 #[cfg(feature = "zenoh")]
 use super::zenoh::ZenohNode;
-use super::{Put, Qos, Sender, TransportName, TypeName};
+use super::{Graph, Put, Qos, Sender, TransportName, TypeName};
 use crate::args::Args;
 use crate::inbox::Inbox;
 use ros2_client::Message;
@@ -95,6 +95,16 @@ impl Transport {
         }
     }
 
+    /// Returns a view of the topics that others publish.
+    pub fn graph(&self) -> Graph {
+        match self {
+            Self::Dds(node) => Graph::Dds(node.graph()),
+            #[cfg(feature = "zenoh")]
+            Self::Zenoh(node) => Graph::Zenoh(node.graph()),
+        }
+    }
+
+    /// Leaves the ROS graph.
     pub fn leave(self) {
         match self {
             Self::Dds(_) => {}

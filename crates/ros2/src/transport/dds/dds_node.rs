@@ -5,8 +5,8 @@ use crate::args::Args;
 use crate::inbox::Inbox;
 use crate::names::Names;
 use crate::services::Rmw;
-use crate::transport::threads::spawn;
-use crate::transport::{self, Gid, Put, Qos, TypeName};
+use crate::transport::spawn;
+use crate::transport::{self, Gid, Published, Put, Qos, TypeName};
 use anyhow::{Context as _, anyhow};
 use futures::StreamExt;
 use futures::executor::block_on;
@@ -31,6 +31,22 @@ pub struct DdsNode {
     inbox: Arc<Inbox>,
     /// Keeps the node in the graph.
     _context: Context,
+}
+
+/// Topics that other participants publish.
+pub struct DdsGraph {
+    participant: DomainParticipant,
+}
+
+impl DdsGraph {
+    pub fn published(&self) -> Vec<Published> {
+        let writers = self.participant.discovered_writers();
+        let published = writers.iter().filter_map(|writer| {
+            let data = &writer.publication_topic_data;
+            Published::of(data.topic_name().strip_prefix("rt")?, &data.type_name)
+        });
+        published.collect()
+    }
 }
 
 const RECEIVE_BUFFER_BYTES: usize = 8 << 20;
@@ -88,7 +104,8 @@ impl DdsNode {
 
     pub fn subscribe(&self, topic: &str, kind: TypeName, qos: Qos, put: Put) -> anyhow::Result<()> {
         // ROS 2 prefixes topic names with `rt` in DDS.
-        let name = self.names.of(topic).map(|_| format!("rt{}", self.names.full(topic)))?;
+        let label = self.names.full(topic);
+        let name = self.names.of(topic).map(|_| format!("rt{label}"))?;
         let qos = policies(qos);
         let topic = self
             .participant
@@ -107,8 +124,7 @@ impl DdsNode {
                         put(transport::Message { cdr: sample.into_value().cdr, publisher });
                     }
                     Err(error) => {
-                        log::debug!("message lost: {error:?}");
-                        inbox.count(|counters| counters.transport_errors += 1);
+                        inbox.note_lost(1, &format!("{label}: {error:?}"));
                     }
                 }
                 futures::future::ready(())
@@ -131,6 +147,11 @@ impl DdsNode {
         let dds_topic = node.create_topic(&name, kind, &qos).map_err(|error| failed(&error))?;
         let publisher = node.create_publisher(&dds_topic, Some(qos)).map_err(|error| failed(&error))?;
         Ok(DdsSender { node: self.node.clone(), publisher })
+    }
+
+    /// Returns a view of the topics that others publish.
+    pub fn graph(&self) -> DdsGraph {
+        DdsGraph { participant: self.participant.clone() }
     }
 
     pub fn serve<Q, A>(

@@ -6,5 +6,5 @@ mod marked;
 mod raw_message;
 mod servers;
 
-pub use dds_node::DdsNode;
+pub use dds_node::{DdsGraph, DdsNode};
 pub use dds_sender::DdsSender;

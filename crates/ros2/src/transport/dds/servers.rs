@@ -2,7 +2,7 @@ use super::marked::Marked;
 use crate::names::Names;
 use crate::services::Rmw;
 use crate::transport::TypeName;
-use crate::transport::threads::spawn;
+use crate::transport::spawn;
 use anyhow::anyhow;
 use futures::StreamExt;
 use futures::executor::block_on;

@@ -90,6 +90,11 @@ impl GraphName {
         format!("{SPACE}/{}/*/*/*/MS/*/*/*/{name}/{type_name}/{type_hash}/*", self.domain_id)
     }
 
+    /// Returns a pattern for the tokens of all publishers.
+    pub fn publishers(&self) -> String {
+        format!("{SPACE}/{}/*/*/*/MP/*/*/*/*/*/*/*", self.domain_id)
+    }
+
     fn start(&self) -> String {
         format!("{SPACE}/{}/{}/0", self.domain_id, self.zenoh_id)
     }
@@ -97,6 +102,13 @@ impl GraphName {
     fn end(&self) -> String {
         format!("{NONE}/{}/{}", mangled(&self.namespace), self.node_name)
     }
+}
+
+/// Returns the Zenoh ID, the name and the DDS type of the topic of a publisher's token.
+pub fn publisher_of(token: &str) -> Option<(&str, String, &str)> {
+    let parts: Vec<&str> = token.split('/').collect();
+    let [_, _, zenoh_id, _, _, "MP", _, _, _, name, type_name, _, _] = *parts.as_slice() else { return None };
+    Some((zenoh_id, name.replace('%', "/"), type_name))
 }
 
 /// Returns the GID that `rmw_zenoh_cpp` derives from the token of an endpoint.
@@ -164,5 +176,20 @@ mod tests {
         };
         assert!(pattern.includes(&token(End::Subscription)));
         assert!(!pattern.includes(&token(End::Publisher)));
+    }
+
+    #[test]
+    fn topics_of_publishers_are_read_from_tokens() {
+        let (node, names) = in_namespace("/robot");
+        let cloud = Channel::topic(&names, "cloud_in", TypeName::new("sensor_msgs", "PointCloud2")).unwrap();
+        let token = |end| node.token_of(9, end, &cloud, Qos::best_effort(5));
+        let pattern = zenoh::key_expr::KeyExpr::try_from(node.publishers()).unwrap();
+        assert!(pattern.includes(&zenoh::key_expr::KeyExpr::try_from(token(End::Publisher)).unwrap()));
+        let found =
+            publisher_of(&token(End::Publisher)).map(|(id, topic, kind)| format!("{id} {topic} {kind}"));
+        assert_eq!(found.as_deref(), Some("ab12 /robot/cloud_in sensor_msgs::msg::dds_::PointCloud2_"));
+        for other in [token(End::Subscription), node.token(), String::new(), "a/".repeat(12)] {
+            assert_eq!(publisher_of(&other), None, "{other}");
+        }
     }
 }

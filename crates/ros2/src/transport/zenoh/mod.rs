@@ -14,8 +14,10 @@ mod mailbox;
 mod service;
 mod subscribers;
 mod type_hash;
+mod zenoh_graph;
 mod zenoh_node;
 mod zenoh_sender;
 
+pub use zenoh_graph::ZenohGraph;
 pub use zenoh_node::ZenohNode;
 pub use zenoh_sender::ZenohSender;

@@ -4,11 +4,12 @@ use super::graph_name::{Channel, End, GraphName, gid_of};
 use super::mailbox::Mailbox;
 use super::service::{respond, waiting_bytes};
 use super::subscribers::Subscribers;
+use super::zenoh_graph::ZenohGraph;
 use super::zenoh_sender::ZenohSender;
 use crate::args::Args;
 use crate::inbox::Inbox;
 use crate::names::Names;
-use crate::transport::threads::spawn;
+use crate::transport::spawn;
 use crate::transport::{Gid, Message, Put, Qos, TypeName};
 use anyhow::anyhow;
 use serde::{Serialize, de::DeserializeOwned};
@@ -79,7 +80,7 @@ impl ZenohNode {
         let channel = Channel::topic(&self.names, topic, kind)?;
         let key = key(&channel.key(self.name.domain_id))?;
         let mailbox = Mailbox::new(qos.depth, self.max_bytes);
-        let callback = self.receiver(&mailbox);
+        let callback = self.receiver(&channel.name, &mailbox);
         let subscriber = self.session.declare_subscriber(key).callback(callback);
         let declared = if qos.is_latched {
             let mut advanced = subscriber
@@ -131,6 +132,15 @@ impl ZenohNode {
         Ok(ZenohSender { publisher, subscribers, gid, sent: AtomicI64::new(0) })
     }
 
+    /// Returns a view of the topics that others publish.
+    pub fn graph(&self) -> ZenohGraph {
+        ZenohGraph {
+            session: self.session.clone(),
+            publishers: self.name.publishers(),
+            own_id: self.name.zenoh_id.clone(),
+        }
+    }
+
     pub fn serve<Q, A>(
         &mut self,
         service: &str,
@@ -155,8 +165,10 @@ impl ZenohNode {
                     _ => 1,
                 };
                 if lost > 0 {
-                    log::debug!("{label}: a request is dropped: invalid, too large, or the queue is full");
-                    inbox.count(|counters| counters.transport_errors += lost as u64);
+                    inbox.note_lost(
+                        lost as u64,
+                        &format!("{label}: invalid or too large, or the queue is full"),
+                    );
                 }
             })
             .background()
@@ -183,13 +195,17 @@ impl ZenohNode {
     }
 
     /// Returns the callback of a subscription. It only queues the message, so that Zenoh's threads do not wait.
-    fn receiver(&self, mailbox: &Arc<Mailbox<Message>>) -> impl Fn(Sample) + Send + Sync + 'static {
+    fn receiver(
+        &self,
+        label: &str,
+        mailbox: &Arc<Mailbox<Message>>,
+    ) -> impl Fn(Sample) + Send + Sync + 'static {
         let (mailbox, inbox, max_bytes) = (mailbox.clone(), self.inbox.clone(), self.max_bytes);
+        let label = label.to_owned();
         move |sample| {
             let bytes = sample.payload().len();
             if bytes > max_bytes {
-                log::debug!("{}: a message of {bytes} bytes is larger than the queue", sample.key_expr());
-                inbox.count(|counters| counters.too_large += 1);
+                inbox.note_too_large(&label, bytes);
                 return;
             }
             let attachment = sample.attachment().and_then(|bytes| Attachment::from_bytes(&bytes.to_bytes()));
@@ -197,7 +213,7 @@ impl ZenohNode {
             let cdr = sample.payload().to_bytes().into_owned();
             let lost = mailbox.put(Message { cdr, publisher }, bytes);
             if lost > 0 {
-                inbox.count(|counters| counters.transport_errors += lost as u64);
+                inbox.note_lost(lost as u64, &format!("{label}: messages arrive faster than they are read"));
             }
         }
     }
