@@ -30,7 +30,9 @@ impl StayCounter {
     ///
     /// An I/O error.
     pub(crate) fn beside(map: &MapReader, memory: MemoryLimit) -> Result<Self> {
-        let parent = map.folder().parent().unwrap_or(map.folder());
+        // The path of the map may be relative, such as `..`, or a link.
+        let real = map.folder().canonicalize().map_err(|error| Error::io(map.folder(), "find", error))?;
+        let parent = real.parent().unwrap_or(&real);
         let folder = tempfile::Builder::new().prefix(".voxtile-clean-").tempdir_in(parent);
         let folder = folder.map_err(|error| Error::io(parent, "create a temporary folder in", error))?;
         let grid = map.grid();

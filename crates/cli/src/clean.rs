@@ -4,6 +4,7 @@ use crate::json;
 use crate::part::region_of;
 use crate::quiet::summary_out;
 use crate::replay::{self, Job};
+use crate::stop_signal;
 use serde::Serialize;
 use std::io::Write;
 use std::path::Path;
@@ -26,12 +27,21 @@ struct Summary<'a> {
     peak_rss_bytes: Option<u64>,
 }
 
+/// State of a map with earlier marks after a run that did not end.
+const ONLY_UNMARKED: &str =
+    "the earlier marks are removed, and no point has got a new one; run the command again";
+
 pub fn run(args: &CleanArgs) -> anyhow::Result<ExitCode> {
     let map = whole_map(&args.map)?;
     let started = Instant::now();
-    let job = Job::of(&args.replay)?;
+    let stop = if args.undo { stop_signal::catch_undone()? } else { stop_signal::catch_unmarked()? };
+    let job = Job::with_stop(&args.replay, stop);
     let region = args.region.as_deref().map(region_of).transpose()?;
+    // Earlier marks are removed by a commit of their own, before the search.
+    let (mut had_marks, mut are_removed) = (false, false);
     let progress = |phase, done, all| {
+        had_marks |= phase == Phase::Undoing;
+        are_removed |= had_marks && phase != Phase::Undoing;
         job.progress.set(done, all);
         job.progress.show_message(match phase {
             Phase::Undoing => "removing earlier marks",
@@ -46,18 +56,25 @@ pub fn run(args: &CleanArgs) -> anyhow::Result<ExitCode> {
         true => undo(map, &job.replay, progress),
         false => clean(map, &options, progress),
     };
-    let cleaned = match job.ended(outcome)? {
+    are_removed &= !args.undo;
+    let state = if are_removed { ONLY_UNMARKED } else { "the map has not changed" };
+    let outcome = match job.ended_with(outcome, state) {
+        Err(error) if are_removed => return Err(error.context(ONLY_UNMARKED)),
+        outcome => outcome?,
+    };
+    let cleaned = match outcome {
         Ok(cleaned) => cleaned,
         Err(code) => return Ok(code),
     };
     drop(job);
+    let has_commit = !args.replay.dry_run && (are_removed || cleaned.replayed.scans_changed > 0);
     let mut out = summary_out(args.replay.json || args.replay.dry_run);
     if args.replay.json {
         let summary = Summary {
             map,
             dry_run: args.replay.dry_run,
             undo: args.undo,
-            kept_as: args.replay.keep_as.as_ref().map(|name| name.as_str()),
+            kept_as: args.replay.keep_as.as_ref().filter(|_| has_commit).map(|name| name.as_str()),
             cleaned,
             seconds: started.elapsed().as_secs_f64(),
             peak_rss_bytes: memory::peak_bytes(),

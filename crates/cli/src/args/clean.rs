@@ -10,7 +10,8 @@ pub struct CleanArgs {
     /// Remove all marks: the map is that of before clean
     #[arg(long, conflicts_with_all = ["region", "parked_scans"])]
     pub undo: bool,
-    /// Mark only points in a box (X0 <= x < X1, same for y and z), in metres, world frame
+    /// Mark only points in a box (X0 <= x < X1, same for y and z), in metres, world frame; earlier marks outside of it
+    /// are removed
     #[arg(long, value_names = ["X0", "Y0", "Z0", "X1", "Y1", "Z1"], num_args = 6)]
     pub region: Option<Vec<f64>>,
     /// Mark nothing that at least N scans hit in the same place, such as a parked car that leaves later [default:

@@ -443,4 +443,10 @@ fn what_moved_is_marked_exported_and_unmarked() {
     fails(&["clean", &other, "--undo", "--parked-scans", "3"], 2);
     fails(&["clean", &other, "--parked-scans", "0"], 2);
     assert_eq!(json(&["clean", &other, "--parked-scans", "1", "--json"])["points_changed"], 0);
+    // The map may be the current folder. Nothing changes, so there is no snapshot.
+    let mut here = voxtile(&["clean", ".", "--parked-scans", "1", "--keep-as", "none", "--json"]);
+    let here = here.current_dir(&other).output().unwrap();
+    assert!(here.status.success(), "{}", String::from_utf8_lossy(&here.stderr));
+    let here: serde_json::Value = serde_json::from_slice(&here.stdout).unwrap();
+    assert_eq!(here["kept_as"], serde_json::Value::Null);
 }
