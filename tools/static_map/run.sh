@@ -154,7 +154,7 @@ Written by `tools/static_map/run.sh`. Shares are in percent, distances in metres
 written by `workload movers`: a street with cars, trams, cyclists, walkers close to walls, doors, and parked cars that
 leave.
 
-![A street by OctoMap's rule: half of the road is missing](clearing_before.png)
+![A street by OctoMap's rule: much of the road is missing](clearing_before.png)
 ![The same street with guarded clearing](clearing_after.png)
 
 *`kitti_0001_a` with voxels of 0.1 m, drawn by `tools/static_map/pictures.sh`: by OctoMap's rule, and with guarded

@@ -8,7 +8,7 @@ use voxtile_pipeline::{AnyMap, read_moving_points};
 
 /// Maximum number of points in a response.
 const MAX_POINTS: usize = 200_000;
-/// Maximum number of points of the scans that are read for a response, which takes about two seconds. If more scans
+/// Maximum number of points of the scans that are read for a response, which takes some seconds. If more scans
 /// have marks, every n-th is read.
 const MAX_POINTS_READ: u64 = 1 << 25;
 
@@ -43,15 +43,22 @@ pub fn moving(map: &AnyMap, known: Option<u64>) -> Result<Vec<u8>> {
     {
         marks = Marks::of(map)?;
         if known != Some(marks.version) {
-            let (every, mut number) = (marks.points_to_read.div_ceil(MAX_POINTS_READ).max(1), 0);
-            let is_wanted = |_: &KeptRecord| {
-                number += 1;
-                (number - 1) % every == 0
-            };
-            read_moving_points(map, is_wanted, |points| points.iter().for_each(|&at| thinned.offer(at)))?;
+            thinned = read(map, marks.points_to_read, MAX_POINTS_READ)?;
         }
     }
     Ok(gzip(&bytes_of(&marks, &thinned)))
+}
+
+/// Reads the marked points; if the scans that have some have more than `max_points` points, only of every n-th of them.
+fn read(map: &MapReader, points: u64, max_points: u64) -> Result<Thinned> {
+    let (every, mut number) = (points.div_ceil(max_points).max(1), 0);
+    let is_wanted = |_: &KeptRecord| {
+        number += 1;
+        (number - 1) % every == 0
+    };
+    let mut thinned = Thinned::new();
+    read_moving_points(map, is_wanted, |points| points.iter().for_each(|&point| thinned.offer(point)))?;
+    Ok(thinned)
 }
 
 /// Encodes a response as `docs/view.md` describes.
@@ -125,6 +132,41 @@ impl Thinned {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use voxtile::mapper::OutOfCoreTileMapper;
+    use voxtile::operations::{Replay, mark_moving};
+    use voxtile::scan::MovingMarks;
+    use voxtile::{MapConfig, Mapper, Scan};
+
+    #[test]
+    fn of_too_many_points_every_second_scan_is_read() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("map");
+        let config = MapConfig::new(0.1, 10.0).unwrap().with_kept_scans(true);
+        let mut map = OutOfCoreTileMapper::create(&path, config).unwrap();
+        for scan in 0..10 {
+            let points = (0..10).map(|point| [5.0, f64::from(scan), f64::from(point)]).collect();
+            map.insert_scan(&Scan { points, ..Scan::default() }).unwrap();
+        }
+        map.flush().unwrap();
+        drop(map);
+        let open = || MapReader::open(&path, 1 << 20).unwrap();
+        let before = Marks::of(&open()).unwrap();
+        assert!(before.keeps_scans && (before.points, before.points_to_read) == (0, 0));
+        // The last three points of the scans with an odd number.
+        let marks = |_| Ok(MovingMarks::new((0..10).map(|point| point > 6)));
+        let summary = open().kept_summary().unwrap();
+        mark_moving(&summary, [1, 3, 5, 7, 9], marks, &Replay::default(), |_, _| ()).unwrap();
+        let map = open();
+        let marks = Marks::of(&map).unwrap();
+        assert_eq!((marks.points, marks.points_to_read), (15, 50));
+        assert_ne!(marks.version, before.version);
+        let all = read(&map, marks.points_to_read, 50).unwrap();
+        let rows = |thinned: &Thinned| thinned.points.iter().map(|[_, y, _]| *y).collect::<Vec<f32>>();
+        assert_eq!(rows(&all), [0.0, 2.0, 4.0, 6.0, 8.0].map(|y| [y; 3]).concat());
+        assert_eq!(all.origin_m, [5.0, 0.0, 7.0]);
+        let half = read(&map, marks.points_to_read, 49).unwrap();
+        assert_eq!(rows(&half), [0.0, 4.0, 8.0].map(|y| [y; 3]).concat());
+    }
 
     #[test]
     fn points_are_thinned_evenly() {

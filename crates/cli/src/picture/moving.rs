@@ -33,12 +33,12 @@ pub fn add_moving(map: &MapReader, args: &PictureArgs, drawing: &mut Drawing) ->
     });
     let is_near =
         |record: &KeptRecord| tiles.is_none_or(|tiles| record.tiles.iter().any(|&tile| tiles.contains(tile)));
-    let (mut marked, progress) = (0, Progress::over_scans(None));
+    let (mut marked, progress) = (0_u64, Progress::over_scans(None));
     // The legend has a line of the points even if there are none.
     drawing.add_moving(&[]);
     let is_wanted = |record: &KeptRecord| {
         progress.step();
-        marked += record.moving.map_or(0, |moving| moving.marked);
+        marked = marked.saturating_add(record.moving.map_or(0, |moving| moving.marked));
         is_near(record)
     };
     read_moving_points(map, is_wanted, |points| drawing.add_moving(points))?;

@@ -163,7 +163,10 @@ async function loadMoving() {
   const number = ++movingNumber;
   viewer.overlays.show('moving', $('moving').checked);
   viewer.wake();
-  if (!$('moving').checked) return;
+  if (!$('moving').checked) {
+    if (!moving) $('moving-out').value = '';
+    return;
+  }
   const id = idOf(maps[0]).split('~')[0];
   if (moving?.id !== id) {
     moving = null;
