@@ -7,6 +7,7 @@
 //!   -> ScanReader, in its own thread -> ScanQueue -> Ingest         scan_reader, scan_queue, ingest
 //!   -> a mapper -> Summary                                          summary
 //! ExportOptions -> export -> ExportSummary                          export/, output/
+//! read_moving_points: marked points of kept scans                    moving_points
 //! numbers: lists of numbers used by all front ends                  numbers
 //! PolygonFile: an area of GeoJSON                                   polygon_file
 //! Watch: stops work and receives its progress                       watch
@@ -26,6 +27,7 @@ mod input_chain;
 mod kept_source;
 mod map_at;
 pub mod memory;
+mod moving_points;
 mod new_poses;
 pub mod numbers;
 pub mod octree_file;
@@ -54,6 +56,7 @@ pub use map_at::{
     AnyMap, MapAt, check_is_no_file, open_any_map, read_all_maps, read_any_map, read_map, read_maps,
     whole_map,
 };
+pub use moving_points::read_moving_points;
 pub use new_poses::{PoseFile, poses_for};
 pub use polygon_file::PolygonFile;
 pub use scan_input::{ScanInput, ScanInputs, is_standard_input, open_paths};

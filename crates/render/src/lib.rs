@@ -26,5 +26,5 @@ pub mod levels;
 mod picture;
 mod survey;
 
-pub use picture::{Change, ColorBy, Drawn, Image, OverTime, Panel, Picture, SideAxis, View, colors};
+pub use picture::{Change, ColorBy, Drawing, Drawn, Image, OverTime, Panel, Picture, SideAxis, View, colors};
 pub use survey::{HeightBin, Survey};

@@ -291,3 +291,56 @@ fn a_survey_counts_the_content_of_a_map() {
     let nothing = InMemoryMapper::new(MapConfig::new(0.1, 10.0).unwrap()).unwrap();
     assert_eq!(Survey::of(&nothing, |_, _| {}).unwrap(), Survey::default());
 }
+
+#[test]
+fn moving_points_cover_the_map() {
+    let at = |voxel: [i32; 3]| voxel.map(|index| (f64::from(index) + 0.9) * RESOLUTION_M);
+    // Two points in one voxel, one over the wall, one beyond it, and invalid ones.
+    let points =
+        [at([2, 1, 0]), center([2, 1, 0]), at([5, 3, 9]), at([4, 3, 2]), at([-1, 1, 0]), [f64::NAN; 3]];
+    let map = wall();
+    let finish = |picture: &Picture, parts: &[&[Point]]| {
+        let mut drawing = picture.start(&map, |_, _| {}).unwrap();
+        parts.iter().for_each(|part| drawing.add_moving(part));
+        drawing.finish()
+    };
+    let drawn = finish(&plain(), &[&points]);
+    assert_eq!(drawn.moving_points, Some(3), "points above all tiles and outside do not count");
+    for moving in [[2, 1], [4, 3]] {
+        assert_eq!(cell(&drawn, moving), colors::MOVING, "{moving:?}");
+    }
+    assert_eq!(cell(&drawn, [5, 3]), colors::color_of(0.0));
+    // Scan by scan, the picture is the same.
+    let parts: Vec<&[Point]> = points.chunks(1).collect();
+    assert_eq!(finish(&plain(), &parts).image, drawn.image);
+    assert_eq!(draw(&plain(), &map).moving_points, None);
+
+    let layer = plain().with_view(View::Slice { z_m: 1.25, thickness_m: 0.0 });
+    let of_layer = finish(&layer, &[&points]);
+    assert_eq!(of_layer.moving_points, Some(1));
+    assert_eq!(cell(&of_layer, [4, 0]), colors::MOVING);
+    let from_side = finish(&plain().with_view(View::Side(SideAxis::X)), &[&points]);
+    assert_eq!((cell(&from_side, [2, 0]), cell(&from_side, [4, 2])), (colors::MOVING, colors::MOVING));
+    let region = Aabb { min: [1.0, 0.0, 0.0], max: [2.0, 2.0, 2.0] };
+    assert_eq!(finish(&plain().with_region(region), &[&points]).moving_points, Some(0));
+    let options = plain();
+    let mut difference = options.start_difference(&map, &map, |_, _| {}).unwrap();
+    difference.add_moving(&points);
+    assert_eq!(cell(&difference.finish(), [4, 3]), colors::MOVING);
+
+    // The legend has one more line, also without points.
+    let with_legend = Picture::new().with_grid(false);
+    let (without, none) = (draw(&with_legend, &map), finish(&with_legend, &[&[]]));
+    assert!(none.image.height_px() > without.image.height_px() && none.moving_points == Some(0));
+    let count = |drawn: &Drawn| {
+        let image = &drawn.image;
+        let pixels = (0..image.height_px()).flat_map(|y| (0..image.width_px()).map(move |x| (x, y)));
+        pixels.filter(|&(x, y)| image.pixel(x, y) == Some(colors::MOVING)).count()
+    };
+    assert_eq!(count(&without), 0);
+    assert!(count(&none) > 0, "the swatch");
+    let empty = InMemoryMapper::new(MapConfig::new(RESOLUTION_M, 4.0).unwrap()).unwrap();
+    let mut nothing = with_legend.start(&empty, |_, _| {}).unwrap();
+    nothing.add_moving(&points);
+    assert_eq!(nothing.finish().moving_points, Some(0));
+}

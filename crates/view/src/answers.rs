@@ -1,6 +1,7 @@
 //! Computes responses. This may read tiles, so it runs on blocking threads.
 
 use super::map_state::Shown;
+use super::moving::moving;
 use super::response::{Answer, Keep};
 use super::route::{MapId, Thing};
 use super::served_map::{Found, Makes, ServedMap};
@@ -67,7 +68,7 @@ pub fn of_map(
         }
     } else {
         map.query_map(id).and_then(|found| match found {
-            Some(found) => query_result(found.map(), thing),
+            Some(found) => query_result(found.map(), thing, version),
             None => Ok(None),
         })
     };
@@ -107,13 +108,13 @@ fn of_levels(shown: &Shown, thing: &Thing, version: Option<u64>) -> Result<Optio
     Ok(match thing {
         Thing::Tileset => Some(Answer::json(shown.tileset()?)),
         Thing::Subtree(key) => shown.subtree(*key)?.map(Answer::json).map(kept),
-        Thing::Node(key, kind) => shown.node(*key, *kind)?.map(|bytes| Answer::node(bytes, keep)),
-        Thing::Query(_) | Thing::Raycast(..) | Thing::Trajectory => None,
+        Thing::Node(key, kind) => shown.node(*key, *kind)?.map(|bytes| Answer::bytes(bytes, keep)),
+        Thing::Query(_) | Thing::Raycast(..) | Thing::Trajectory | Thing::Moving => None,
     })
 }
 
-/// Responds from the map alone, without levels.
-fn query_result(map: &AnyMap, thing: &Thing) -> Result<Option<Answer>> {
+/// Responds from the map alone, without levels. `version` is that of the marks that the client has.
+fn query_result(map: &AnyMap, thing: &Thing, version: Option<u64>) -> Result<Option<Answer>> {
     let answer = match thing {
         Thing::Query(point) => query(map, *point)?,
         Thing::Raycast(from, to) => raycast(map, *from, *to)?,
@@ -121,6 +122,7 @@ fn query_result(map: &AnyMap, thing: &Thing) -> Result<Option<Answer>> {
             let (scans, points) = trajectory(map, TRAJECTORY)?;
             json!({ "scans": scans, "points": points })
         }
+        Thing::Moving => return Ok(Some(Answer::bytes(moving(map, version)?, Keep::No))),
         Thing::Tileset | Thing::Subtree(_) | Thing::Node(..) => return Ok(None),
     };
     Ok(Some(Answer::json(answer)))

@@ -57,7 +57,7 @@ impl Answer {
         Self::new(voxtile_monitoring::CONTENT_TYPE, gzip(text.as_bytes()), Keep::No)
     }
 
-    pub fn node(gzip: Vec<u8>, keep: Keep) -> Self {
+    pub fn bytes(gzip: Vec<u8>, keep: Keep) -> Self {
         Self::new("application/octet-stream", gzip, keep)
     }
 

@@ -38,6 +38,8 @@ pub enum Thing {
     Query(Point),
     Raycast(Point, Point),
     Trajectory,
+    /// Points of kept scans that are marked as moving.
+    Moving,
 }
 
 impl Route {
@@ -67,6 +69,11 @@ impl Route {
 }
 
 impl Thing {
+    /// Returns whether the resource needs points of kept scans.
+    pub fn takes_scans(&self) -> bool {
+        matches!(self, Self::Moving)
+    }
+
     /// Returns whether the resource needs the levels of a state.
     pub fn takes_levels(&self) -> bool {
         matches!(self, Self::Tileset | Self::Subtree(_) | Self::Node(..))
@@ -77,6 +84,7 @@ impl Thing {
         match path {
             "tileset.json" => Some(Self::Tileset),
             "trajectory.json" => Some(Self::Trajectory),
+            "moving.bin" => Some(Self::Moving),
             "query" => {
                 let number = |name| field(question, name)?.parse().ok();
                 Some(Self::Query(finite([number("x")?, number("y")?, number("z")?])?))
@@ -166,6 +174,8 @@ mod tests {
         assert_eq!(query, Some(Route::Of(now.clone(), Thing::Query([1.0, -2.5, 30.0]))));
         let ray = route("/sesame_42/maps/1/raycast", Some("from=0,0,0&to=1%2C2,3"));
         assert_eq!(ray, Some(Route::Of(now, Thing::Raycast([0.0; 3], [1.0, 2.0, 3.0]))));
+        let moving = route("/sesame_42/maps/0@b/moving.bin", Some("v=00ff"));
+        assert!(matches!(moving, Some(Route::Of(_, Thing::Moving))), "{moving:?}");
         let name = |name| At::Snapshot(SnapshotName::new(name).unwrap());
         let since = MapId { number: 0, at: name("b"), since: Some(name("a")) };
         assert_eq!(route("/sesame_42/maps/0@b~a/tileset.json", None), Some(Route::Of(since, Thing::Tileset)));

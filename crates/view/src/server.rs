@@ -48,6 +48,8 @@ pub struct Server {
     work: Work,
     /// Builds levels of snapshots, one at a time on all cores. This takes seconds, so it must not block other work.
     making: Work,
+    /// Reads kept scans, for one response at a time. This takes seconds, too.
+    reading: Work,
     memory: AnswerMemory,
     connections: Connections,
     responses: Responses,
@@ -62,9 +64,10 @@ impl Server {
     ) -> Self {
         let threads = std::thread::available_parallelism().map_or(2, usize::from);
         let id = format!("{:016x}", RandomState::new().build_hasher().finish());
-        let (work, making, memory) = (Work::new(threads), Work::new(1), AnswerMemory::default());
+        let [work, making, reading] = [threads, 1, 1].map(Work::new);
+        let memory = AnswerMemory::default();
         let (connections, responses) = (Connections::new(), Responses::default());
-        Self { id, maps, token, address, changed, work, making, memory, connections, responses }
+        Self { id, maps, token, address, changed, work, making, reading, memory, connections, responses }
     }
 
     pub fn run(self, listener: TcpListener) -> anyhow::Result<()> {
@@ -224,7 +227,8 @@ impl Server {
             let (server, id, thing) = (self.clone(), id.clone(), thing.clone());
             move || answers::of_map(&server.maps, &id, &thing, version, makes)
         };
-        let answer = match self.work.run(ask(Makes::Nothing)).await {
+        let first = if thing.takes_scans() { &self.reading } else { &self.work };
+        let answer = match first.run(ask(Makes::Nothing)).await {
             // Build the levels first.
             Some(None) => self.making.run(ask(Makes::Levels)).await,
             answer => answer,
@@ -304,23 +308,52 @@ async fn stop_signal() -> std::io::Result<()> {
 mod tests {
     use super::super::route::{At, MapId, Thing};
     use super::*;
+    use std::path::Path;
     use tokio::time::timeout;
     use voxtile::mapper::OutOfCoreTileMapper;
     use voxtile::store::SnapshotName;
     use voxtile::{MapConfig, Mapper, Scan};
 
-    #[test]
-    fn building_levels_of_a_snapshot_does_not_block_other_requests() {
-        let folder = tempfile::tempdir().unwrap();
-        let (path, name) = (folder.path().join("map"), SnapshotName::new("monday").unwrap());
+    /// Returns a server of a map with a snapshot.
+    fn server(folder: &Path, snapshot: &SnapshotName) -> Arc<Server> {
+        let path = folder.join("map");
         let mut map = OutOfCoreTileMapper::create(&path, MapConfig::new(0.1, 1.0).unwrap()).unwrap();
         map.insert_scan(&Scan { points: vec![[2.0, 0.0, 0.0]], ..Scan::default() }).unwrap();
-        map.snapshot(&name).unwrap();
+        map.snapshot(snapshot).unwrap();
         drop(map);
         let maps = vec![Arc::new(ServedMap::open(&path, false, Arc::new(|_, _| ())).unwrap())];
         let (_changes, changed) = watch::channel(0);
         let address = SocketAddr::from(([127, 0, 0, 1], 0));
-        let server = Arc::new(Server::new(maps, Token::new("sesame_42").unwrap(), address, changed));
+        Arc::new(Server::new(maps, Token::new("sesame_42").unwrap(), address, changed))
+    }
+
+    #[test]
+    fn reading_scans_does_not_block_other_requests() {
+        let (folder, name) = (tempfile::tempdir().unwrap(), SnapshotName::new("monday").unwrap());
+        let server = server(folder.path(), &name);
+        let of_map = |thing| Route::Of(MapId { number: 0, at: At::Now, since: None }, thing);
+        let runtime = tokio::runtime::Builder::new_multi_thread().enable_all().build().unwrap();
+        runtime.block_on(async {
+            let (end, may_end) = std::sync::mpsc::channel::<()>();
+            let reading = server.clone();
+            tokio::spawn(async move { reading.reading.run(move || may_end.recv()).await });
+            tokio::time::sleep(Duration::from_millis(50)).await;
+            let waiting = {
+                let (server, route) = (server.clone(), of_map(Thing::Moving));
+                tokio::spawn(async move { server.compute(route, None).await })
+            };
+            let answer = timeout(Duration::from_secs(60), server.compute(of_map(Thing::Trajectory), None));
+            assert_eq!(answer.await.expect("no answer").status, StatusCode::OK);
+            assert!(!waiting.is_finished());
+            end.send(()).unwrap();
+            assert_eq!(waiting.await.unwrap().status, StatusCode::OK);
+        });
+    }
+
+    #[test]
+    fn building_levels_of_a_snapshot_does_not_block_other_requests() {
+        let (folder, name) = (tempfile::tempdir().unwrap(), SnapshotName::new("monday").unwrap());
+        let server = server(folder.path(), &name);
         let of_snapshot =
             |thing| Route::Of(MapId { number: 0, at: At::Snapshot(name.clone()), since: None }, thing);
         let runtime = tokio::runtime::Builder::new_multi_thread().enable_all().build().unwrap();
@@ -337,7 +370,7 @@ mod tests {
                 .collect();
             tokio::time::sleep(Duration::from_millis(50)).await;
             let at = [2.0, 0.0, 0.0];
-            for thing in [Thing::Trajectory, Thing::Query(at), Thing::Raycast([0.0; 3], at)] {
+            for thing in [Thing::Trajectory, Thing::Moving, Thing::Query(at), Thing::Raycast([0.0; 3], at)] {
                 let answer = timeout(Duration::from_secs(60), server.compute(of_snapshot(thing), None)).await;
                 assert_eq!(answer.expect("no answer").status, StatusCode::OK);
             }

@@ -35,6 +35,9 @@ pub struct PictureArgs {
     /// Draw the changes since a snapshot of the map or since another map: appeared, vanished, unchanged
     #[arg(long, value_name = "SNAPSHOT|MAP", conflicts_with = "color")]
     pub since: Option<PathBuf>,
+    /// Also draw the points of kept scans that clean has marked as moving, in red with a light rim
+    #[arg(long)]
+    pub moving: bool,
     #[arg(long, help = help::JSON)]
     pub json: bool,
 }

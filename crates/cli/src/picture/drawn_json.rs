@@ -26,12 +26,16 @@ pub struct DrawnJson {
     range: Option<[f64; 2]>,
     known_cells: u64,
     solid_cells: u64,
+    /// Points marked as moving that are drawn; with `--moving`.
+    moving_points: Option<u64>,
+    /// Points of all kept scans that are marked as moving; with `--moving`.
+    marked_points: Option<u64>,
     tiles: u64,
     peak_rss_bytes: Option<u64>,
 }
 
 impl DrawnJson {
-    pub fn of(args: &PictureArgs, file: &Path, drawn: &Drawn) -> Self {
+    pub fn of(args: &PictureArgs, file: &Path, drawn: &Drawn, marked_points: Option<u64>) -> Self {
         Self {
             file: file.display().to_string(),
             from: view_name(args.from),
@@ -47,6 +51,8 @@ impl DrawnJson {
             range: drawn.range,
             known_cells: drawn.known_cells,
             solid_cells: drawn.solid_cells,
+            moving_points: drawn.moving_points,
+            marked_points,
             tiles: drawn.tiles,
             peak_rss_bytes: memory::peak_bytes(),
         }

@@ -1,6 +1,7 @@
 //! `voxtile picture`: draws a map as a PNG.
 
 mod drawn_json;
+mod moving;
 
 use crate::args::{ColorName, PictureArgs, ViewName};
 use crate::json;
@@ -8,16 +9,18 @@ use crate::part::region_of;
 use crate::progress::Progress;
 use crate::quiet::summary_out;
 use drawn_json::DrawnJson;
+use indicatif::HumanCount;
+use moving::{add_moving, map_with_marks};
 use std::ffi::OsString;
 use std::io::{self, IsTerminal, Write};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
-use voxtile::mapper::MapView;
+use voxtile::mapper::{MapReader, MapView};
 use voxtile::space::Point;
 use voxtile::{Error, Result};
 use voxtile_pipeline::output::{OutputFile, is_standard_output};
 use voxtile_pipeline::{AnyMap, read_any_map};
-use voxtile_render::{ColorBy, Drawn, Picture, SideAxis, View};
+use voxtile_render::{ColorBy, Drawing, Drawn, Picture, SideAxis, View};
 
 /// Draws a map and prints a summary, to standard error if the picture is written to standard output. `is_quiet`
 /// suppresses the summary.
@@ -31,34 +34,50 @@ pub fn run(args: &PictureArgs, is_quiet: bool) -> anyhow::Result<ExitCode> {
     let drawn = match &args.since {
         None => read_any_map(&args.map, |map| {
             check_color(map, args.color)?;
+            let with_marks = map_with_marks(args, map)?;
             let progress = Progress::over_tiles(0);
             let picture = complete(&picture, args, map);
-            Ok((picture.draw(map, |done, all| progress.set(done, all))?, picture))
+            let drawing = picture.start(map, |done, all| progress.set(done, all))?;
+            drop(progress);
+            Ok(finish(drawing, args, with_marks)?)
         }),
         Some(since) => {
             let before = state_before(&args.map, since);
             read_any_map(&args.map, |after| {
+                let with_marks = map_with_marks(args, after)?;
                 read_any_map(&before, |before| {
                     let progress = Progress::over_tiles(0);
                     let picture = complete(&picture, args, after);
                     let on_progress = |done, all| progress.set(done, all);
-                    Ok((picture.draw_difference(before, after, on_progress)?, picture))
+                    let drawing = picture.start_difference(before, after, on_progress)?;
+                    drop(progress);
+                    Ok(finish(drawing, args, with_marks)?)
                 })
             })
         }
     };
-    let (drawn, _) = drawn?;
+    let (drawn, marked) = drawn?;
     write_png(&drawn, &args.output)?;
     if args.json {
-        let of = DrawnJson::of(args, &args.output, &drawn);
+        let of = DrawnJson::of(args, &args.output, &drawn, marked);
         let out: &mut dyn Write = if is_stream { &mut io::stderr() } else { &mut io::stdout() };
         json::print(&of, &mut { out })?;
     } else if !is_stream {
-        writeln!(summary_out(false), "{}: {}", args.output.display(), caption(args, &drawn))?;
+        writeln!(summary_out(false), "{}: {}", args.output.display(), caption(args, &drawn, marked))?;
     } else if !is_quiet {
-        writeln!(io::stderr(), "{}", caption(args, &drawn))?;
+        writeln!(io::stderr(), "{}", caption(args, &drawn, marked))?;
     }
     Ok(ExitCode::SUCCESS)
+}
+
+/// Finishes a drawing, with the marked points if their map is given. Also returns the number of all marked points.
+fn finish(
+    mut drawing: Drawing,
+    args: &PictureArgs,
+    with_marks: Option<&MapReader>,
+) -> Result<(Drawn, Option<u64>)> {
+    let marked = with_marks.map(|map| add_moving(map, args, &mut drawing)).transpose()?;
+    Ok((drawing.finish(), marked))
 }
 
 /// Writes a picture atomically.
@@ -160,8 +179,8 @@ fn state_before(map: &Path, since: &Path) -> PathBuf {
     name.into()
 }
 
-/// Returns a one-line summary of the picture.
-fn caption(args: &PictureArgs, drawn: &Drawn) -> String {
+/// Returns a one-line summary of the picture. `marked` is the number of points of the map that are marked as moving.
+fn caption(args: &PictureArgs, drawn: &Drawn, marked: Option<u64>) -> String {
     let Some(region) = drawn.region_m else { return "no observed voxels here".to_owned() };
     let axes = match args.from {
         ViewName::Above => [0, 1],
@@ -177,5 +196,11 @@ fn caption(args: &PictureArgs, drawn: &Drawn) -> String {
         (Some([least, most]), ColorName::LastScan) => format!("; last scan {least:.0} (dark) to {most:.0}"),
     };
     let changes = if args.since.is_some() { "; blue appeared, orange vanished, grey unchanged" } else { "" };
-    format!("{across:.1} x {up:.1} m, {:.3} m per cell{scale}{changes}", drawn.cell_m)
+    let moving = match (marked, drawn.moving_points.unwrap_or_default()) {
+        (None, _) => String::new(),
+        (Some(0), _) => "; no point is marked as moving: `voxtile clean` marks them".to_owned(),
+        (Some(marked), drawn) if marked == drawn => format!("; {} moving points", HumanCount(marked)),
+        (Some(marked), drawn) => format!("; {} of {} moving points", HumanCount(drawn), HumanCount(marked)),
+    };
+    format!("{across:.1} x {up:.1} m, {:.3} m per cell{scale}{changes}{moving}", drawn.cell_m)
 }

@@ -682,3 +682,32 @@ fn every_format_has_the_same_voxels_above_a_probability() {
         }
     }
 }
+
+/// Builds a map of a wall that keeps its scans, with guarded clearing; something passes the wall in the third of six
+/// scans. Returns the map and the number of points on what passes.
+pub fn map_with_a_passer_by(folder: &Path) -> (PathBuf, u64) {
+    let passing = wall_with_a_passer_by(folder);
+    let (scans, poses, map) = (folder.join("scans"), folder.join("poses.txt"), folder.join("passed"));
+    let options = ["--keep-scans", "--resolution", "0.2", "--clearing", "guarded"];
+    output(&[&["build", text(&scans), "--poses", text(&poses), "-o", text(&map)][..], &options].concat());
+    (map, passing)
+}
+
+/// Writes six scans of a wall; in the third, something is before the wall. Returns the number of its points.
+fn wall_with_a_passer_by(folder: &Path) -> u64 {
+    fs::create_dir_all(folder.join("scans")).unwrap();
+    let mut passing = 0;
+    for scan in 0..6 {
+        let mut points = String::new();
+        for (row, column) in (-40..=40).flat_map(|row| (-40..=40).map(move |column| (row, column))) {
+            let (y, z) = (f64::from(column) * 0.05, f64::from(row) * 0.05);
+            let is_passing = scan == 2 && y.abs() < 0.8 && z.abs() < 0.8;
+            passing += u64::from(is_passing);
+            let share = if is_passing { 0.5 } else { 1.0 };
+            points += &format!("{} {} {}\n", 5.05 * share, y * share, z * share);
+        }
+        fs::write(folder.join(format!("scans/{scan}.xyz")), points).unwrap();
+    }
+    fs::write(folder.join("poses.txt"), "1 0 0 0 0 1 0 0 0 0 1 0\n".repeat(6)).unwrap();
+    passing
+}

@@ -1,4 +1,5 @@
-use crate::cli::{failure, json, output, scans, text, voxtile};
+use crate::cli::{failure, json, map_with_a_passer_by, output, scans, text, voxtile};
+use serde_json::Value;
 use std::fs;
 use std::path::{Path, PathBuf};
 use tempfile::TempDir;
@@ -82,6 +83,62 @@ fn changes_since_a_snapshot_are_drawn() {
     assert!(count(APPEARED, &pixels) > 10 * count(VANISHED, &pixels));
     let (code, error) = failure(&["picture", text(&map), "-o", text(&file), "--since", "nothing"]);
     assert!(code != 0 && error.contains("nothing"), "{error}");
+}
+
+#[test]
+fn points_marked_as_moving_are_drawn() {
+    let folder = TempDir::new().unwrap();
+    let (moved, file) = (map_with_a_passer_by(folder.path()).0, folder.path().join("moved.png"));
+    let (moved, file) = (text(&moved), text(&file));
+    let draw = |more: &[&str]| json(&[&["picture", moved, "-o", file, "--json"][..], more].concat());
+    let red = || {
+        let (.., pixels) = pixels_of(Path::new(file));
+        pixels.iter().filter(|&&pixel| pixel == voxtile_render::colors::MOVING).count()
+    };
+    let counts = |printed: &Value| (printed["moving_points"].clone(), printed["marked_points"].clone());
+    assert_eq!(counts(&draw(&["--moving"])), (0.into(), 0.into()));
+    let swatch = red();
+    let said = output(&["picture", moved, "-o", file, "--moving"]);
+    assert!(said.contains("no point is marked as moving: `voxtile clean` marks them"), "{said}");
+    let marked = json(&["clean", moved, "--keep-as", "before", "--json"])["points_changed"].clone();
+    assert_eq!(counts(&draw(&[])), (Value::Null, Value::Null));
+    assert_eq!(red(), 0);
+
+    // What passed is 2.5 m in front of the sensor, up to 0.4 m to each side.
+    let all = (marked.clone(), marked.clone());
+    for more in [
+        &["--moving"][..],
+        &["--moving", "--from", "side-x"],
+        &["--moving", "--slice", "0", "--thickness", "2"],
+        &["--moving", "--region", "2", "-1", "-1", "3", "1", "1"],
+        &["--moving", "--since", "before"],
+        &["--moving", "--size", "64"],
+    ] {
+        assert_eq!(counts(&draw(more)), all, "{more:?}");
+        assert!(red() > swatch, "{more:?}: {}", red());
+    }
+    let layer = draw(&["--moving", "--slice", "0"]);
+    assert!(layer["moving_points"].as_u64() > Some(0) && layer["moving_points"].as_u64() < marked.as_u64());
+    assert_eq!(layer["marked_points"], marked);
+    let elsewhere = ["--moving", "--region", "4", "-9", "-9", "9", "9", "9"];
+    assert_eq!(counts(&draw(&elsewhere)), (0.into(), marked.clone()));
+    let said = output(&[&["picture", moved, "-o", file][..], &elsewhere].concat());
+    assert!(said.contains("; 0 of ") && said.contains(" moving points"), "{said}");
+    // A snapshot has its own marks.
+    let before = json(&["picture", &format!("{moved}@before"), "-o", file, "--moving", "--json"]);
+    assert_eq!(counts(&before), (0.into(), 0.into()));
+}
+
+#[test]
+fn maps_without_kept_scans_have_no_moving_points() {
+    let folder = TempDir::new().unwrap();
+    let (map, tree, file) = (map(&folder), folder.path().join("a.bt"), folder.path().join("a.png"));
+    output(&["export", text(&map), "-o", text(&tree)]);
+    for (map, reason) in [(&map, "--keep-scans"), (&tree, "OctoMap")] {
+        let (code, error) = failure(&["picture", text(map), "-o", text(&file), "--moving"]);
+        assert!(code == 2 && error.contains("--moving") && error.contains(reason), "{error}");
+        assert!(!file.exists());
+    }
 }
 
 #[test]

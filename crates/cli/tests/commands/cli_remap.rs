@@ -1,4 +1,4 @@
-use crate::cli::{failure, json, output, scans, text, voxtile};
+use crate::cli::{failure, json, map_with_a_passer_by, output, scans, text, voxtile};
 use std::fs;
 use std::path::{Path, PathBuf};
 use tempfile::TempDir;
@@ -367,44 +367,11 @@ fn a_map_has_one_rule_of_clearing() {
     assert_eq!(digest(&again), digest(&fresh));
 }
 
-/// Writes six scans of a wall; in the third, something is before the wall. Returns the number of its points.
-fn wall_with_a_passer_by(folder: &Path) -> u64 {
-    fs::create_dir_all(folder.join("scans")).unwrap();
-    let mut passing = 0;
-    for scan in 0..6 {
-        let mut points = String::new();
-        for (row, column) in (-40..=40).flat_map(|row| (-40..=40).map(move |column| (row, column))) {
-            let (y, z) = (f64::from(column) * 0.05, f64::from(row) * 0.05);
-            let is_passing = scan == 2 && y.abs() < 0.8 && z.abs() < 0.8;
-            passing += u64::from(is_passing);
-            let share = if is_passing { 0.5 } else { 1.0 };
-            points += &format!("{} {} {}\n", 5.05 * share, y * share, z * share);
-        }
-        fs::write(folder.join(format!("scans/{scan}.xyz")), points).unwrap();
-    }
-    fs::write(folder.join("poses.txt"), "1 0 0 0 0 1 0 0 0 0 1 0\n".repeat(6)).unwrap();
-    passing
-}
-
 #[test]
 fn what_moved_is_marked_exported_and_unmarked() {
     let folder = TempDir::new().unwrap();
-    let passing = wall_with_a_passer_by(folder.path());
-    let path = |name: &str| text(&folder.path().join(name)).to_owned();
-    let (scans, poses, map) = (path("scans"), path("poses.txt"), path("map"));
-    output(&[
-        "build",
-        &scans,
-        "--poses",
-        &poses,
-        "-o",
-        &map,
-        "--keep-scans",
-        "--resolution",
-        "0.2",
-        "--clearing",
-        "guarded",
-    ]);
+    let (map, passing) = map_with_a_passer_by(folder.path());
+    let (map, path) = (text(&map).to_owned(), |name: &str| text(&folder.path().join(name)).to_owned());
     let before = digest(&map);
     let planned = json(&["clean", &map, "--dry-run", "--json"]);
     let cleaned = json(&["clean", &map, "--keep-as", "before", "--json"]);

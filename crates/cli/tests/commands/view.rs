@@ -1,5 +1,6 @@
 //! `voxtile view` serves exactly the map to authorised clients, whatever other clients do.
 
+use crate::cli::map_with_a_passer_by;
 use assert_cmd::cargo::cargo_bin;
 use serde_json::Value;
 use std::collections::BTreeSet;
@@ -141,6 +142,24 @@ impl Viewer {
     fn finest(&self, map: &str) -> Vec<([i64; 3], u8)> {
         let is_finest = |path: &&String| path.contains("/node/0/");
         self.nodes(map).iter().filter(is_finest).flat_map(|path| self.voxels(path)).collect()
+    }
+
+    /// Returns the number of all marked points, the version of the marks, whether the map keeps scans, and points in
+    /// millimetres.
+    fn moving(&self, path: &str) -> (u64, u64, bool, Vec<[i64; 3]>) {
+        let reply = self.get(path);
+        assert_eq!((reply.status, &reply.body[..4]), (200, &b"VXM1"[..]), "{path}");
+        let bytes = reply.body;
+        let count = u32::from_le_bytes(bytes[4..8].try_into().unwrap()) as usize;
+        assert_eq!(bytes.len(), 56 + 12 * count);
+        let number = |at: usize| u64::from_le_bytes(bytes[at..at + 8].try_into().unwrap());
+        let coordinate = |point: usize, axis: usize| {
+            let at = 56 + 12 * point + 4 * axis;
+            let offset = f32::from_le_bytes(bytes[at..at + 4].try_into().unwrap());
+            (1000.0 * (f64::from_bits(number(24 + 8 * axis)) + f64::from(offset))).round() as i64
+        };
+        let points = (0..count).map(|point| [0, 1, 2].map(|axis| coordinate(point, axis))).collect();
+        (number(8), number(16), bytes[48] == 1, points)
     }
 
     fn bytes_read(&self) -> u64 {
@@ -292,6 +311,41 @@ fn metrics_need_the_token_and_follow_the_map() {
     let without_token =
         format!("GET /metrics HTTP/1.1\r\nhost: {}\r\nconnection: close\r\n\r\n", viewer.address);
     assert_eq!(viewer.send(&without_token).status, 404);
+}
+
+#[test]
+fn points_marked_as_moving_are_served() {
+    let (folder, other) = a_map();
+    let (moved, _) = map_with_a_passer_by(folder.path());
+    let viewer = Viewer::ready(&[&moved, &other], &folder.path().join("cache"));
+    let (none, before, keeps_scans, points) = viewer.moving("maps/0/moving.bin");
+    assert_eq!((none, keeps_scans, points.len()), (0, true, 0));
+    assert!(!viewer.moving("maps/1/moving.bin").2, "the other map keeps no scans");
+
+    run(&["clean", text(&moved), "--keep-as", "before", "-q"]);
+    let started = Instant::now();
+    while viewer.moving("maps/0/moving.bin").0 == 0 {
+        assert!(started.elapsed() < PATIENCE);
+        std::thread::sleep(Duration::from_millis(50));
+    }
+    let (marked, version, _, points) = viewer.moving("maps/0/moving.bin");
+    assert!(marked as usize == points.len() && version != before);
+    // Of the third scan, what is nearer than the wall.
+    let scan = fs::read_to_string(folder.path().join("scans/2.xyz")).unwrap();
+    let parsed = scan.lines().map(|line| {
+        let mut numbers = line.split(' ').map(|k| (1000.0 * k.parse::<f64>().unwrap()).round() as i64);
+        [0; 3].map(|_| numbers.next().unwrap())
+    });
+    let passing: BTreeSet<[i64; 3]> = parsed.filter(|[x, ..]| *x < 3000).collect();
+    assert!(points.iter().all(|point| passing.contains(point)));
+    assert_eq!(points.iter().collect::<BTreeSet<_>>().len(), points.len());
+    // A client with these marks gets no points, also of a later state; a snapshot has its own marks.
+    let known = format!("maps/0/moving.bin?v={version:016x}");
+    assert_eq!(viewer.moving(&known), (marked, version, true, Vec::new()));
+    assert_eq!(viewer.moving(&format!("maps/0/moving.bin?v={before:x}")).3.len() as u64, marked);
+    viewer.wait(|maps| maps[0]["snapshots"][0]["name"] == "before");
+    assert_eq!(viewer.moving("maps/0@before/moving.bin").0, 0);
+    assert_eq!(viewer.get("maps/0@none/moving.bin").status, 404);
 }
 
 #[test]

@@ -3,11 +3,12 @@ use super::cells::{Cell, Rank};
 use super::collect::{Collected, Known};
 use super::font;
 use super::image::Image;
-use super::legend::{Legend, Scale};
+use super::legend::{Legend, Scale, legend_height};
+use super::moving::Moving;
 use super::options::Picture;
 use super::palette::{self, Rgb, color_of, lit, mixed};
 use super::view::{Change, ColorBy};
-use voxtile::space::{Aabb, Grid, TileIndex};
+use voxtile::space::{Aabb, Grid, Point, TileIndex};
 
 /// A picture with its scale and extent.
 #[derive(Clone, Debug)]
@@ -30,6 +31,8 @@ pub struct Drawn {
     pub solid_cells: u64,
     /// Number of cells with an observed voxel.
     pub known_cells: u64,
+    /// Number of points on moving objects in the picture; `None` if [`Drawing::add_moving`] was not called.
+    pub moving_points: Option<u64>,
     /// Number of tiles that were read.
     pub tiles: u64,
     /// Tiles that could not be read and are missing.
@@ -37,21 +40,22 @@ pub struct Drawn {
 }
 
 /// Visible cells and their position in the image.
-struct Pane {
+pub(super) struct Pane {
     first: [usize; 2],
     cells: [usize; 2],
     /// Edge length of a cell in pixels.
-    zoom: usize,
+    pub zoom: usize,
     left: usize,
     top: usize,
 }
 
-/// Conversion of cells to pixels.
-pub(super) struct Drawing<'a> {
+/// A picture whose tiles are read. Points can be added before it is finished.
+pub struct Drawing<'a> {
     picture: &'a Picture,
     grid: Grid,
     collected: Collected,
     range: Option<[f64; 2]>,
+    moving: Option<Moving>,
 }
 
 /// Minimum width of the legend.
@@ -67,7 +71,7 @@ impl Pane {
     }
 
     /// Returns the upper left pixel of a cell; rows are numbered downwards.
-    fn pixel(&self, [across, up]: [usize; 2]) -> [usize; 2] {
+    pub fn pixel(&self, [across, up]: [usize; 2]) -> [usize; 2] {
         let row = self.cells[1] - 1 - (up - self.first[1]);
         [self.left + (across - self.first[0]) * self.zoom, self.top + row * self.zoom]
     }
@@ -82,19 +86,29 @@ impl Pane {
 }
 
 impl<'a> Drawing<'a> {
-    pub fn new(picture: &'a Picture, grid: Grid, collected: Collected) -> Self {
-        let mut drawing = Self { picture, grid, collected, range: None };
+    pub(super) fn new(picture: &'a Picture, grid: Grid, collected: Collected) -> Self {
+        let mut drawing = Self { picture, grid, collected, range: None, moving: None };
         drawing.range = drawing.range();
         drawing
     }
 
-    pub fn draw(mut self) -> Drawn {
+    /// Adds points on moving objects, in metres, world frame; they cover the map, with a line in the legend. Points
+    /// outside of the picture, its region or its slice are not drawn. May be called for each scan: only cells are kept.
+    pub fn add_moving(&mut self, points_m: &[Point]) {
+        let moving = self.moving.get_or_insert_default();
+        if let Some(known) = &self.collected.known {
+            moving.add(points_m, &self.grid, &known.frame, with_air(known));
+        }
+    }
+
+    /// Draws the picture.
+    pub fn finish(mut self) -> Drawn {
         let Some(known) = self.collected.known.take() else { return self.draw_nothing() };
         let (first, cells) = with_air(&known);
         let most_px = self.picture.most_px;
         let zoom = (0..2).map(|k| most_px[k] / cells[k]).min().unwrap_or(1).clamp(1, LARGEST_ZOOM);
         let size = cells.map(|n| n * zoom);
-        let layout = Layout::of(self.picture, size);
+        let layout = Layout::of(self.picture, size, self.moving.is_some());
         let pane = Pane { first, cells, zoom, left: layout.left, top: layout.top };
         let mut canvas = Canvas::new(layout.width, layout.height, palette::UNKNOWN);
         self.draw_cells(&mut canvas, &known, &pane);
@@ -104,6 +118,9 @@ impl<'a> Drawing<'a> {
         if let Some(every_m) = lines_m {
             self.draw_tile_lines(&mut canvas, &known, &pane, every_m);
         }
+        if let Some(moving) = &self.moving {
+            moving.draw(&mut canvas, &known.frame, &pane);
+        }
         self.draw_path(&mut canvas, &known, &pane, layout.dot);
         if self.picture.has_legend {
             canvas.text(layout.margin, layout.margin, layout.dot, palette::INK, &self.title(&layout));
@@ -112,6 +129,7 @@ impl<'a> Drawing<'a> {
                 lines_m,
                 axes: self.picture.view.axes(),
                 has_path: !self.picture.path.is_empty(),
+                moving_points: self.moving.as_ref().map(|moving| moving.points),
                 scale: self.scale(),
             };
             legend.draw(&mut canvas, layout.foot, layout.dot);
@@ -128,6 +146,7 @@ impl<'a> Drawing<'a> {
             range: self.range.filter(|_| !self.collected.is_difference),
             solid_cells: count(Rank::Occupied),
             known_cells: count(Rank::Free),
+            moving_points: self.moving.map(|moving| moving.points),
             tiles: self.collected.tiles,
             unread: self.collected.unread,
         }
@@ -152,6 +171,7 @@ impl<'a> Drawing<'a> {
             range: None,
             solid_cells: 0,
             known_cells: 0,
+            moving_points: self.moving.map(|moving| moving.points),
             tiles: self.collected.tiles,
             unread: self.collected.unread,
         }
@@ -339,7 +359,7 @@ struct Layout {
 }
 
 impl Layout {
-    fn of(picture: &Picture, size: [usize; 2]) -> Self {
+    fn of(picture: &Picture, size: [usize; 2], has_moving: bool) -> Self {
         if !picture.has_legend {
             let [width, height] = size;
             return Self { width, height, margin: 0, left: 0, top: 0, foot: height, dot: 1 };
@@ -350,6 +370,7 @@ impl Layout {
         let width = inner + 2 * margin;
         let top = 2 * margin + font::HEIGHT * dot;
         let foot = top + size[1] + margin;
-        Self { width, height: foot + 24 * dot + margin, margin, left: (width - size[0]) / 2, top, foot, dot }
+        let legend = legend_height(has_moving) * dot;
+        Self { width, height: foot + legend + margin, margin, left: (width - size[0]) / 2, top, foot, dot }
     }
 }

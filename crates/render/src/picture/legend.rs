@@ -13,6 +13,8 @@ pub struct Legend {
     pub axes: [usize; 2],
     /// Whether the trajectory is drawn.
     pub has_path: bool,
+    /// Number of points on moving objects, if they are drawn.
+    pub moving_points: Option<u64>,
     pub scale: Scale,
 }
 
@@ -22,6 +24,14 @@ pub enum Scale {
     Values { color_by: ColorBy, range: Option<[f64; 2]> },
     /// Change from one state to another.
     Change,
+}
+
+/// First row of the line of moving points, below the other parts of the legend, in dots.
+const MOVING_ROW: usize = 29;
+
+/// Returns the height of the legend in dots.
+pub fn legend_height(has_moving: bool) -> usize {
+    if has_moving { MOVING_ROW + font::HEIGHT + 2 } else { 24 }
 }
 
 impl Legend {
@@ -74,6 +84,10 @@ impl Legend {
             let color = if matches!(self.scale, Scale::Change) { palette::INK } else { palette::PATH };
             canvas.path(std::iter::once([sensor + 3 * dot, top + 3 * dot]), dot + 1, color);
             canvas.text(sensor + 11 * dot, top, dot, palette::FAINT_INK, "sensor");
+        }
+        if let Some(points) = self.moving_points {
+            let label = format!("moving points: {}", grouped(points));
+            draw_swatch(canvas, [margin, foot + MOVING_ROW * dot], dot, palette::MOVING, &label);
         }
     }
 
@@ -140,6 +154,19 @@ fn name_of(axis: usize) -> &'static str {
     ["x", "y", "z"].get(axis).copied().unwrap_or_default()
 }
 
+/// Formats a number with a comma before every third digit.
+fn grouped(number: u64) -> String {
+    let digits = number.to_string();
+    let mut text = String::new();
+    for (at, digit) in digits.chars().enumerate() {
+        if at > 0 && (digits.len() - at).is_multiple_of(3) {
+            text.push(',');
+        }
+        text.push(digit);
+    }
+    text
+}
+
 fn height_label(height_m: f64) -> String {
     // Adding 0 converts -0, for example of a height just below the ground, to 0.
     format!("{:.1} m", (height_m * 10.0).round() / 10.0 + 0.0)
@@ -156,10 +183,17 @@ mod tests {
     }
 
     #[test]
+    fn digits_are_grouped() {
+        assert_eq!([0, 999, 1000, 1_234_567].map(grouped), ["0", "999", "1,000", "1,234,567"]);
+    }
+
+    #[test]
     fn a_name_and_its_values_do_not_overlap() {
         for (width, dot, is_named) in [(2000, 2, true), (600, 2, true), (600, 3, false), (240, 2, false)] {
             let scale = Scale::Values { color_by: ColorBy::Height, range: Some([-12.5, 108.6]) };
-            let legend = Legend { metres_a_pixel: 0.1, lines_m: None, axes: [0, 2], has_path: false, scale };
+            let (lines_m, has_path, moving_points) = (None, false, None);
+            let legend =
+                Legend { metres_a_pixel: 0.1, lines_m, axes: [0, 2], has_path, moving_points, scale };
             let bar = legend.bar_width(width, dot);
             assert!(bar <= width / 2);
             assert_eq!(bar >= needed_width("height", ["-12.5 m", "108.6 m"], dot), is_named, "{width}");

@@ -4,7 +4,7 @@
 //! Picture   options                                            options, view
 //! Frame     voxels of each cell                                frame
 //! Cells     the best observation of each cell                  cells, collect
-//! Drawing   cells, grid, trajectory, legend                    drawing, legend, scale
+//! Drawing   cells, grid, moving points, trajectory, legend     drawing, moving, legend, scale
 //! Canvas    pixels, boxes, letters                             canvas, font, palette, image
 //! OverTime  panels of a local map at several times             over_time
 //! ```
@@ -17,13 +17,14 @@ mod font;
 mod frame;
 mod image;
 mod legend;
+mod moving;
 mod options;
 mod over_time;
 mod palette;
 mod scale;
 mod view;
 
-pub use drawing::Drawn;
+pub use drawing::{Drawing, Drawn};
 pub use image::Image;
 pub use options::Picture;
 pub use over_time::{OverTime, Panel};
@@ -31,5 +32,5 @@ pub use view::{Change, ColorBy, SideAxis, View};
 
 /// Colors of pictures, as red, green and blue in sRGB.
 pub mod colors {
-    pub use super::palette::{APPEARED, FREE, PATH, Rgb, SAME, UNKNOWN, VANISHED, color_of};
+    pub use super::palette::{APPEARED, FREE, MOVING, PATH, Rgb, SAME, UNKNOWN, VANISHED, color_of};
 }

@@ -7,7 +7,7 @@ use voxtile::{Error, Result};
 
 /// Options of a picture of a map.
 ///
-/// Memory: 12 bytes per cell, 4 per pixel, and one tile per thread, whatever the size of the map.
+/// Memory: 12 bytes per cell (13 with moving points), 4 per pixel, and one tile per thread, whatever the size of the map.
 #[derive(Clone, Debug)]
 pub struct Picture {
     pub(super) view: View,
@@ -99,6 +99,15 @@ impl Picture {
     ///
     /// Fails if a tile cannot be read, if the map has no values for the color, or if a height or region is invalid.
     pub fn draw(&self, map: &dyn MapView, progress: impl Fn(u64, u64) + Sync) -> Result<Drawn> {
+        Ok(self.start(map, progress)?.finish())
+    }
+
+    /// Reads the tiles of a map, like [`Picture::draw`], and returns a drawing that takes points before it is finished.
+    ///
+    /// # Errors
+    ///
+    /// As [`Picture::draw`].
+    pub fn start(&self, map: &dyn MapView, progress: impl Fn(u64, u64) + Sync) -> Result<Drawing<'_>> {
         self.check()?;
         let knows_scans =
             || map.tile_indices().first().is_none_or(|&tile| map.last_scan_of_tile_hint(tile).is_some());
@@ -107,7 +116,7 @@ impl Picture {
             return Err(Error::argument("color", reason));
         }
         let collected = Collected::of(self, Source::One(map), &progress)?;
-        Ok(Drawing::new(self, map.config().grid, collected).draw())
+        Ok(Drawing::new(self, map.config().grid, collected))
     }
 
     /// Draws the difference of two maps or states of a map: voxels occupied in both, only before, or only after, in
@@ -123,6 +132,21 @@ impl Picture {
         after: &dyn MapView,
         progress: impl Fn(u64, u64) + Sync,
     ) -> Result<Drawn> {
+        Ok(self.start_difference(before, after, progress)?.finish())
+    }
+
+    /// Reads the tiles of two maps, like [`Picture::draw_difference`], and returns a drawing that takes points before it
+    /// is finished.
+    ///
+    /// # Errors
+    ///
+    /// As [`Picture::draw_difference`].
+    pub fn start_difference(
+        &self,
+        before: &dyn MapView,
+        after: &dyn MapView,
+        progress: impl Fn(u64, u64) + Sync,
+    ) -> Result<Drawing<'_>> {
         self.check()?;
         let [grid_before, grid] = [before, after].map(|map| map.config().grid);
         if grid_before != grid {
@@ -131,7 +155,7 @@ impl Picture {
             return Err(Error::argument("the map before", reason));
         }
         let collected = Collected::of(self, Source::Two { before, after }, &progress)?;
-        Ok(Drawing::new(self, grid, collected).draw())
+        Ok(Drawing::new(self, grid, collected))
     }
 
     fn check(&self) -> Result<()> {

@@ -168,6 +168,76 @@ try {
   assert.match(await browser.value('document.getElementById("legend-ends").textContent'), /appeared.*vanished.*unchanged/);
   step('changes since a snapshot are shown');
 
+  // Six scans of a wall, in a rotated frame; in the third, something passes.
+  const passing = new Set();
+  const passed = join(work, 'passed');
+  mkdirSync(passed);
+  for (let number = 0; number < 6; number++) {
+    const points = [];
+    for (let row = -40; row <= 40; row++) for (let column = -40; column <= 40; column++) {
+      const [y, z] = [column * 0.05, row * 0.05];
+      const isPassing = number === 2 && Math.abs(y) < 0.8 && Math.abs(z) < 0.8;
+      const point = [5.05, y, z].map((k) => (isPassing ? 0.5 * k : k));
+      points.push(point.join(' '));
+      // The pose turns x to y, and moves by 100 m along x.
+      if (isPassing) passing.add([100 - point[1], point[0], point[2]].map((k) => Math.round(1000 * k)).join(' '));
+    }
+    writeFileSync(join(passed, `${number}.xyz`), points.join('\n'));
+  }
+  writeFileSync(join(work, 'passed.txt'), '0 -1 0 100 1 0 0 0 0 0 1 0\n'.repeat(6));
+  const wall = join(work, 'wall');
+  run('build', passed, '--poses', join(work, 'passed.txt'), '-o', wall, '--keep-scans', '--resolution', '0.2', '--clearing', 'guarded', '-q');
+  const label = 'document.getElementById("moving-out").value';
+  await browser.open('about:blank');
+  const first = server;
+  await browser.open(await view(wall, map));
+  server = first;
+  await browser.ready();
+  const requests = 'performance.getEntriesByType("resource").filter(({ name }) => name.includes("moving.bin")).length';
+  assert.equal(await browser.value(requests), 0, 'points are loaded only if they are shown');
+  await browser.value('document.getElementById("moving").click()');
+  await browser.until(`${label} === 'none marked'`, 20);
+  const marked = JSON.parse(run('clean', wall, '--json')).points_changed;
+  await browser.until(`${label} === '${marked.toLocaleString('en')}'`, 20);
+  const points = (await browser.value('voxtile.moving()')).map((point) => point.map((k) => Math.round(1000 * k)).join(' '));
+  assert.equal(points.length, marked);
+  assert.ok(points.every((point) => passing.has(point)), 'the points are those of what passed');
+  assert.ok(marked > 0.9 * passing.size);
+  await browser.value('document.getElementById("theme").click(); voxtile.lookAt([100, 0.5, 1], [100, 2.5, 0])');
+  await browser.ready();
+  const reds = async () => {
+    const { data } = await browser.call('Page.captureScreenshot', { format: 'png' });
+    return browser.value(`(async () => {
+      const image = new Image();
+      image.src = 'data:image/png;base64,${data}';
+      await image.decode();
+      const canvas = new OffscreenCanvas(image.width, image.height);
+      const context = canvas.getContext('2d');
+      context.drawImage(image, 0, 0);
+      const { data } = context.getImageData(0, 0, image.width - 264, image.height);
+      let count = 0;
+      for (let k = 0; k < data.length; k += 4) count += Math.hypot(data[k] - 190, data[k + 1] - 18, data[k + 2] - 24) < 8;
+      return count;
+    })()`);
+  };
+  assert.ok(await reds() > 500, `${await reds()} red pixels`);
+  await browser.value('document.getElementById("moving").click()');
+  await browser.ready();
+  assert.equal(await reds(), 0, 'the points are hidden');
+  await browser.value('document.getElementById("moving").click()');
+  await browser.until('document.getElementById("moving").checked');
+  run('clean', wall, '--undo', '-q');
+  await browser.until(`${label} === 'none marked'`, 20);
+  await browser.ready();
+  assert.equal(await reds(), 0, 'marks that are undone are not drawn');
+  await browser.open('about:blank');
+  await browser.open(url);
+  await browser.ready();
+  await browser.value('document.getElementById("moving").click()');
+  await browser.until(`${label} === 'no kept scans'`, 20);
+  assert.deepEqual(browser.errors, []);
+  step(`${marked} moving points are shown, follow clean and are hidden`);
+
   for (const [width, height, dark] of [[360, 640, false], [1280, 720, true]]) {
     await browser.size(width, height, dark);
     await browser.ready();

@@ -2,7 +2,9 @@
 
 import { readLink, writeLink } from './link.js';
 import { logOddsOf, observationsOf, probabilityOf } from './node.js';
-import { CHANGES, LAYERS, drawLegend } from './palette.js';
+import { pointMaterial } from './material.js';
+import { readMoving } from './moving.js';
+import { CHANGES, LAYERS, MOVING, drawLegend } from './palette.js';
 import { centerOf, pick } from './pick.js';
 import { Viewer } from './viewer.js';
 
@@ -39,6 +41,9 @@ let marks = [];
 let answered = null;
 let path = [];
 let pathNumber = 0;
+// Marked points of the first map that were loaded last, and the number of the last request for them.
+let moving = null;
+let movingNumber = 0;
 // Sliders of the cut, and their positions without a cut.
 const CUTS = ['x0', 'x1', 'y0', 'y1', 'z0', 'z1'];
 const OPEN = ['0', '1000', '0', '1000', '0', '1000'];
@@ -121,6 +126,7 @@ function showMaps() {
   viewer.layers.forEach((layer, k) => { layer.isShown = $('layers').querySelectorAll('input')[k]?.checked ?? true; });
   paint();
   readPath();
+  loadMoving();
 }
 
 async function readPath() {
@@ -149,6 +155,42 @@ function showScan() {
   const size = 1.2 * (maps[0]?.resolution_m ?? 0.1);
   if (at && on) viewer.overlays.dot('sensor', at, Math.max(2 * size, 0.1), 0xff3b6b);
   else viewer.overlays.set('sensor', null);
+  viewer.wake();
+}
+
+// Loads the marked points of the first map if they are shown; after a flush only if the marks have changed.
+async function loadMoving() {
+  const number = ++movingNumber;
+  viewer.overlays.show('moving', $('moving').checked);
+  viewer.wake();
+  if (!$('moving').checked) {
+    if (!moving) $('moving-out').value = '';
+    return;
+  }
+  const id = idOf(maps[0]).split('~')[0];
+  if (moving?.id !== id) {
+    moving = null;
+    viewer.overlays.set('moving', null);
+    $('moving-out').value = 'loading';
+  }
+  let read;
+  try {
+    read = await readMoving(`maps/${id}/moving.bin`, moving?.version ?? null);
+  } catch (error) {
+    if (number !== movingNumber) return;
+    if (!moving) $('moving-out').value = 'not loaded';
+    say(`Cannot load the moving points: ${error.message}`);
+    return;
+  }
+  // Ignore the response to an older request.
+  if (number !== movingNumber) return;
+  if (moving?.version !== read.version) {
+    moving = { ...read, id };
+    viewer.overlays.points('moving', read.origin, read.offsets, pointMaterial(0.5 * maps[0].resolution_m, viewer.shared));
+  }
+  const [count, all] = [moving.count, moving.all].map((k) => k.toLocaleString('en'));
+  $('moving-out').value = !moving.keepsScans ? 'no kept scans' : moving.all === 0 ? 'none marked' : count === all ? all : `${count} of ${all}`;
+  viewer.overlays.show('moving', $('moving').checked);
   viewer.wake();
 }
 
@@ -368,6 +410,7 @@ async function change() {
   cut();
   paint();
   readPath();
+  loadMoving();
 }
 
 // A hidden page closes its connection, because a browser has only six for all pages of a server. It receives missed
@@ -421,6 +464,7 @@ for (const kind of ['occupied', 'free', 'unknown']) {
   });
 }
 $('path').addEventListener('change', showScan);
+$('moving').addEventListener('change', loadMoving);
 $('bounds').addEventListener('change', () => {
   const { min, max } = allBounds();
   if ($('bounds').checked) viewer.overlays.box('bounds', min, max, 0x7d8594);
@@ -529,6 +573,10 @@ window.voxtile = {
   drawCalls: () => viewer.renderer.info.render.calls,
   mostDrawCalls: () => viewer.mostCalls,
   bytes: () => viewer.layers.reduce((sum, layer) => sum + layer.bytes, 0),
+  moving() {
+    const { offsets, origin } = moving;
+    return Array.from({ length: moving.count }, (_, k) => origin.map((at, axis) => at + offsets[3 * k + axis]));
+  },
   clickAt,
   screenOf(point) {
     const at = viewer.camera.position.clone().set(...viewer.toScene(point)).project(viewer.camera);
@@ -552,6 +600,7 @@ window.voxtile = {
 
 theme(scheme.matches);
 drawLegend($('legend'));
+$('moving-swatch').style.background = `rgb(${MOVING})`;
 if (matchMedia('(max-width: 700px)').matches) showPanel(false);
 try {
   await readMaps();

@@ -1,5 +1,5 @@
 import * as THREE from 'three';
-import { CHANGES, ramp } from './palette.js';
+import { CHANGES, MOVING, ramp } from './palette.js';
 import { KIND } from './node.js';
 
 const vertex = /* glsl */ `
@@ -83,6 +83,41 @@ export function makeMaterial(kind, shared) {
     },
   });
 }
+
+const pointVertex = /* glsl */ `
+uniform vec3 low, high;
+uniform float edge;
+uniform vec2 pixels;
+varying float rimDepth;
+void main() {
+  vec3 at = (modelMatrix * vec4(position, 1.0)).xyz;
+  if (any(lessThan(at, low)) || any(greaterThan(at, high))) { gl_Position = vec4(2.0, 2.0, 2.0, 1.0); return; }
+  vec4 eye = modelViewMatrix * vec4(position, 1.0);
+  gl_Position = projectionMatrix * eye;
+  vec4 behind = projectionMatrix * (eye - vec4(0.0, 0.0, edge, 0.0));
+  rimDepth = 0.5 + 0.5 * behind.z / behind.w;
+  gl_PointSize = max(3.0, 0.5 * edge * projectionMatrix[1][1] * pixels.y / gl_Position.w);
+}`;
+
+// Discs with a light rim differ from voxels in shape, too. Rims are behind the discs, so that dense points form an area.
+const pointFragment = /* glsl */ `
+uniform vec3 colour;
+varying float rimDepth;
+void main() {
+  float radius = 2.0 * length(gl_PointCoord - 0.5);
+  if (radius > 1.0) discard;
+  bool isRim = radius > 0.75;
+  gl_FragDepth = isRim ? rimDepth : gl_FragCoord.z;
+  gl_FragColor = vec4(isRim ? vec3(1.0) : colour, 1.0);
+  #include <colorspace_fragment>
+}`;
+
+// Returns the material of moving points; `edge` is their diameter in metres. Cuts apply to them.
+export const pointMaterial = (edge, shared) => new THREE.ShaderMaterial({
+  vertexShader: pointVertex,
+  fragmentShader: pointFragment,
+  uniforms: { ...shared, edge: { value: edge }, pixels: { value: new THREE.Vector2() }, colour: { value: linear(MOVING) } },
+});
 
 export function tintLayer(material, rgb) {
   const colour = linear(rgb);

@@ -20,7 +20,7 @@ export class Overlays {
     const before = this.named.get(name);
     if (before) {
       this.group.remove(before);
-      before.traverse((part) => part.geometry?.dispose());
+      before.traverse((part) => [part.geometry, part.material].forEach((owned) => owned?.dispose()));
     }
     this.named.delete(name);
     if (!object) return;
@@ -40,6 +40,21 @@ export class Overlays {
     const drawn = line(points.map((p) => p.map((k, axis) => k - base[axis])), colour);
     drawn.position.set(...base);
     drawn.renderOrder = 2;
+    this.set(name, drawn);
+  }
+
+  // Points as offsets from `base`.
+  points(name, base, offsets, material) {
+    if (offsets.length === 0) return this.set(name, null);
+    const geometry = new THREE.BufferGeometry();
+    geometry.setAttribute('position', new THREE.BufferAttribute(offsets, 3));
+    const drawn = new THREE.Points(geometry, material);
+    drawn.position.set(...base);
+    drawn.renderOrder = 1;
+    drawn.onBeforeRender = (renderer) => {
+      renderer.getDrawingBufferSize(material.uniforms.pixels.value);
+      material.uniformsNeedUpdate = true;
+    };
     this.set(name, drawn);
   }
 

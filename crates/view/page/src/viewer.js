@@ -7,7 +7,7 @@ import { KIND } from './node.js';
 import { Overlays } from './overlays.js';
 
 const MOST_CALLS = 200;
-// Draw calls reserved for overlays: trajectory, sensor, marks, grid, bounding box.
+// Draw calls reserved for overlays: trajectory, sensor, moving points, marks, grid, bounding box.
 const OVERLAY_CALLS = 8;
 
 // Scene with layers, overlays and camera. Draws only after changes.
