@@ -55,7 +55,7 @@ SOURCE_DATE_EPOCH=$(git log -1 --format=%ct)
 export SOURCE_DATE_EPOCH
 
 work=$(mktemp -d)
-trap 'rm -rf "$work"' EXIT
+trap 'rm -rf "$work" python/*LICENSE*' EXIT
 mkdir "$work/out"
 
 tools=$built/release_tools
@@ -156,7 +156,7 @@ wheel() {
     RUSTFLAGS="$remapped" maturin build --quiet --profile dist --locked --zig --target "$1-unknown-linux-gnu" \
         --compatibility manylinux2014 --manifest-path python/Cargo.toml \
         --features voxtile-cli/bucket,voxtile-cli/parquet --out "$work/out"
-    rm python/LICENSE-MIT python/LICENSE-APACHE python/THIRD-PARTY-LICENSES
+    rm python/*LICENSE*
 }
 
 for arch in "${arches[@]}"; do
