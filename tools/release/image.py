@@ -2,8 +2,9 @@
 """Writes a container image (OCI archive) without a container engine: image.py ARCHIVE VERSION TREE...
 
 TREE is the unpacked archive of one architecture, named voxtile-VERSION-CPU-unknown-linux-musl. The image has one layer
-per architecture: the static binaries, licenses and an empty /data, where the command starts. `podman load`, `docker
-load` (25 or newer) and `skopeo copy oci-archive:ARCHIVE` read it. The same trees give the same bytes.
+per architecture: the static binaries, licenses, the certificates of certifi (PyPI) for buckets, and an empty /data,
+where the command starts. `podman load`, `docker load` (25 or newer) and `skopeo copy oci-archive:ARCHIVE` read it. The
+same trees give the same bytes.
 """
 
 import gzip
@@ -16,7 +17,10 @@ import sys
 import tarfile
 import time
 
+import certifi
+
 ARCHITECTURES = {"x86_64": "amd64", "aarch64": "arm64"}
+PROGRAMS = ("voxtile", "voxtile-ros2", "voxtile-share")
 # An unprivileged user, and group.
 USER = 1000
 
@@ -32,12 +36,16 @@ def layer(tree, time_s):
     """Returns the tar archive of the files of an image."""
     out = io.BytesIO()
     with tarfile.open(fileobj=out, mode="w", format=tarfile.USTAR_FORMAT) as archive:
-        for folder in ("data", "usr", "usr/bin", "usr/share", "usr/share/doc", "usr/share/doc/voxtile"):
+        folders = "data etc etc/ssl etc/ssl/certs usr usr/bin usr/share usr/share/doc usr/share/doc/voxtile"
+        for folder in folders.split():
             archive.addfile(entry(folder, time_s, 0o755, tarfile.DIRTYPE, USER if folder == "data" else 0))
         archive.addfile(entry("tmp", time_s, 0o1777, tarfile.DIRTYPE))
-        files = [*tree.glob("bin/*"), *(tree / "share/doc/voxtile").glob("*LICENSE*")]
-        for path in sorted(files):
-            header = entry(f"usr/{path.relative_to(tree)}", time_s, 0o755 if path.parent.name == "bin" else 0o644)
+        files = [tree / "bin" / program for program in PROGRAMS]
+        files += (tree / "share/doc/voxtile").glob("*LICENSE*")
+        named = {f"usr/{path.relative_to(tree)}": path for path in files}
+        named["etc/ssl/certs/ca-certificates.crt"] = pathlib.Path(certifi.where())
+        for name, path in sorted(named.items()):
+            header = entry(name, time_s, 0o755 if path.parent.name == "bin" else 0o644)
             header.size = path.stat().st_size
             with path.open("rb") as data:
                 archive.addfile(header, data)

@@ -59,8 +59,8 @@ trap 'rm -rf "$work" python/*LICENSE*' EXIT
 mkdir "$work/out"
 
 tools=$built/release_tools
-if [[ ! -x $tools/bin/maturin ]]; then python3 -m venv "$tools"; fi
-"$tools/bin/pip" install --quiet cargo-zigbuild==0.24.1 ziglang==0.16.0 'maturin>=1.9,<2'
+if [[ ! -x $tools/bin/python ]]; then python3 -m venv "$tools"; fi
+"$tools/bin/pip" install --quiet cargo-zigbuild==0.24.1 ziglang==0.16.0 'maturin>=1.9,<2' certifi
 if [[ ! -x $tools/bin/cargo-cyclonedx ]]; then
     CARGO_TARGET_DIR=$tools/build cargo install --quiet --locked --root "$tools" cargo-cyclonedx@0.5.9
     rm -rf "$tools/build"
@@ -166,7 +166,7 @@ for arch in "${arches[@]}"; do
     boms "$arch"
     wheel "$arch"
 done
-python3 tools/release/image.py "$work/out/voxtile-$version-oci.tar" "$version" "$work"/voxtile-"$version"-*-linux-musl
+"$tools/bin/python" tools/release/image.py "$work/out/voxtile-$version-oci.tar" "$version" "$work"/voxtile-"$version"-*-linux-musl
 (cd "$work/out" && sha256sum ./* | sed 's| \./| |' >SHA256SUMS)
 
 for archive in "$work/out/"voxtile-*.tar.gz; do tools/release/try.sh "$archive"; done
