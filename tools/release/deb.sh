@@ -2,25 +2,23 @@
 
 maintainer="${DEBFULLNAME:-The voxtile developers} <${DEBEMAIL:-voxtile@localhost.localdomain}>"
 
-# deb NAME SUMMARY DESCRIPTION FILE...: packages the files, with the documents that Debian policy requires.
+# deb NAME SUMMARY DESCRIPTION FILE...: packages the files for $arch, with the documents that Debian policy requires.
 deb() {
-    local name=$1 summary=$2 description=$3 root=$work/deb-$1 documents file
+    local name=$1 summary=$2 description=$3 root=$work/deb-$1-$arch documents file
     shift 3
     documents=$root/usr/share/doc/$name
-    mkdir -p "$root/DEBIAN" "$documents" "$root/usr/share/lintian/overrides"
+    mkdir -p "$root/DEBIAN" "$documents"
     for file in "$@"; do
         # shellcheck disable=SC2086
         (cd "$tree" && cp --parents --recursive $file "$root/usr/")
     done
     # Each manual page belongs to one package.
     [[ $name == voxtile-share ]] || rm -f "$root/usr/share/man/man1/voxtile-share.1"
-    find "$root/usr/share/man" -type f -exec gzip --best --no-name {} +
+    if [[ -d $root/usr/share/man ]]; then find "$root/usr/share/man" -type f -exec gzip --best --no-name {} +; fi
     gzip --best --no-name <CHANGELOG.md >"$documents/changelog.gz"
     debian_changelog "$name" | gzip --best --no-name >"$documents/changelog.Debian.gz"
     gzip --best --no-name <"$tree/share/doc/voxtile/THIRD-PARTY-LICENSES" >"$documents/THIRD-PARTY-LICENSES.gz"
     debian_copyright >"$documents/copyright"
-    # The binaries are static on purpose.
-    echo "$name: shared-library-lacks-prerequisites [usr/bin/$name]" >"$root/usr/share/lintian/overrides/$name"
     control "$name" "$summary" "$description" "$(du --summarize --block-size=1K "$root/usr" | cut -f1)" \
         >"$root/DEBIAN/control"
     (cd "$root" && find usr -type f -print0 | sort --zero-terminated | xargs --null md5sum >DEBIAN/md5sums)
@@ -37,11 +35,12 @@ Version: $version-1
 Architecture: $arch
 Maintainer: $maintainer
 Installed-Size: $4
+Depends: libc6 (>= 2.17)
 Section: science
 Priority: optional
 CONTROL
     case $1 in
-    voxtile) echo "Suggests: voxtile-share" ;;
+    voxtile) echo "Suggests: voxtile-share, voxtile-ros2" ;;
     *) echo "Enhances: voxtile" ;;
     esac
     echo "Description: $2"
@@ -68,7 +67,6 @@ It is licensed, at your option, under the Apache License 2.0 (on Debian systems 
 
 $(cat LICENSE-MIT)
 
-The binary contains third-party crates, whose licenses are in THIRD-PARTY-LICENSES.gz, and parts of the C library musl
-(MIT license, copyright 2005-2020 Rich Felker and others).
+The binary contains third-party crates, whose licenses are in THIRD-PARTY-LICENSES.gz.
 COPYRIGHT
 }

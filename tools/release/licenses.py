@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Prints the licenses of all crates in a binary: licenses.py TARGET PACKAGE...
+"""Prints the licenses of all crates in the binaries of some packages: licenses.py TARGET FEATURES PACKAGE...
 
 Most licenses require their text next to the binary. Crates with the same text are listed together above it.
 """
@@ -10,8 +10,7 @@ import subprocess
 import sys
 
 TEXTS = ("LICENSE", "LICENCE", "COPYING", "COPYRIGHT", "NOTICE", "UNLICENSE")
-GLIBC = """The binaries contain parts of the GNU C library (LGPL-2.1-or-later). The source crate of this release and
-`tools/release/run.sh` rebuild them with another version of that library.
+MUSL = """The binaries contain parts of the C library musl (MIT license, copyright 2005-2020 Rich Felker and others).
 """
 
 
@@ -19,11 +18,11 @@ def cargo(*arguments):
     return subprocess.run(["cargo", *arguments], check=True, stdout=subprocess.PIPE, text=True).stdout
 
 
-def crates(target, packages):
+def crates(target, features, packages):
     """Yields names and versions of the third-party crates that the packages link."""
     selection = [word for package in packages for word in ("--package", package)]
     edges = ["--edges", "normal", "--target", target, "--prefix", "none", "--format", "{p}"]
-    for line in set(cargo("tree", "--locked", *selection, *edges).splitlines()):
+    for line in set(cargo("tree", "--locked", *selection, "--features", features, *edges).splitlines()):
         words = line.split()
         # A path after the version marks a crate of this repository.
         if len(words) >= 2 and not any(word.startswith("(/") for word in words):
@@ -40,12 +39,12 @@ def section(names, text):
     return "\n".join(["=" * 80, *names, "=" * 80, "", text, ""])
 
 
-def main(target, *packages):
+def main(target, features, *packages):
     metadata = json.loads(cargo("metadata", "--locked", "--format-version", "1"))
     known = {(package["name"], package["version"]): package for package in metadata["packages"]}
     # Compared by words: the same license occurs with different line breaks.
     named, without = {}, []
-    for crate in sorted(set(crates(target, packages))):
+    for crate in sorted(set(crates(target, features, packages))):
         package = known[crate]
         name = f"{crate[0]} {crate[1]} ({package['license'].strip()})"
         found = texts(pathlib.Path(package["manifest_path"]).parent)
@@ -53,8 +52,8 @@ def main(target, *packages):
             named.setdefault(" ".join(text.split()), (text, []))[1].append(name)
         if not found:
             without.append(name)
-    if target.endswith("-gnu"):
-        print(GLIBC)
+    if target.endswith("-musl"):
+        print(MUSL)
     for text, names in sorted(named.values(), key=lambda entry: entry[1]):
         print(section(names, text))
     if without:
