@@ -12,6 +12,10 @@ deb() {
         # shellcheck disable=SC2086
         (cd "$tree" && cp --parents --recursive $file "$root/usr/")
     done
+    if [[ $name == voxtile-ros2 ]]; then
+        install -D -m 644 crates/ros2/systemd/node.yaml "$root/etc/voxtile/node.yaml"
+        echo /etc/voxtile/node.yaml >"$root/DEBIAN/conffiles"
+    fi
     # Each manual page belongs to one package.
     [[ $name == voxtile-share ]] || rm -f "$root/usr/share/man/man1/voxtile-share.1"
     if [[ -d $root/usr/share/man ]]; then find "$root/usr/share/man" -type f -exec gzip --best --no-name {} +; fi

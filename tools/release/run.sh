@@ -112,7 +112,10 @@ archive() {
     cp -r "$work/documents/." "$tree/"
     python3 tools/release/licenses.py "$target" "$features" voxtile-cli voxtile-share-node voxtile-ros2 \
         >"$tree/share/doc/voxtile/THIRD-PARTY-LICENSES"
-    install -D -m 644 -t "$tree/lib/systemd/system" crates/ros2/systemd/voxtile-ros2.service
+    # A package needs no account of its own.
+    mkdir -p "$tree/lib/systemd/system"
+    sed 's|/usr/local/bin|/usr/bin|; s|^User=voxtile$|DynamicUser=yes|; /^# *useradd/d' \
+        crates/ros2/systemd/voxtile-ros2.service >"$tree/lib/systemd/system/voxtile-ros2.service"
     tar --create --gzip --directory "$work" --sort=name --owner=0 --group=0 --numeric-owner \
         --mtime="@$SOURCE_DATE_EPOCH" --file "$work/out/voxtile-$version-$target.tar.gz" "$(basename "$tree")"
 }
