@@ -1,10 +1,10 @@
 use super::column_grid::nothing_to_draw;
-use super::column_pages::{Column, ColumnPages, PAGE_EDGE};
 use super::height_range::HeightRange;
 use super::lattice::Lattice;
 use super::options::WriteOptions;
 use super::out_file::OutFile;
 use super::row::{VoxelRow, VoxelSink, VoxelsHead};
+use super::sorted_columns::{Column, SortedColumns};
 use super::tiff_file::{TiffFile, Values};
 use super::{Error, Result};
 use crate::crs_codes::{CrsCodes, FlatCode};
@@ -13,6 +13,9 @@ use flate2::write::ZlibEncoder;
 use std::collections::BTreeMap;
 use std::io::Write;
 use std::path::{Path, PathBuf};
+
+/// Edge of a tile of the image, in columns of voxels.
+const TILE_EDGE: usize = 256;
 
 /// Maximum number of tiles of the image: the file stores the place of each.
 const MAX_TILES: u64 = 1 << 22;
@@ -43,7 +46,7 @@ struct Raster {
     size: [u32; 2],
     /// Tiles along x and y.
     tiles: [u64; 2],
-    columns: ColumnPages,
+    columns: SortedColumns,
 }
 
 impl GeoTiffSink {
@@ -65,34 +68,32 @@ impl Raster {
         let lattice = Lattice::of(first, head.resolution_m);
         let [lowest, highest] = head.bounds_m.map(|corner| lattice.index_at(corner));
         let size = [0, 1].map(|k| highest[k].saturating_sub(lowest[k]).saturating_add(1).max(1) as u64);
-        let tiles = size.map(|columns| columns.div_ceil(PAGE_EDGE as u64));
+        let tiles = size.map(|columns| columns.div_ceil(TILE_EDGE as u64));
         let is_small = tiles[0].checked_mul(tiles[1]).is_some_and(|tiles| tiles <= MAX_TILES);
         let [Ok(width), Ok(height)] = size.map(u32::try_from) else { return Err(too_large(size)) };
         if !is_small {
             return Err(too_large(size));
         }
-        let columns = ColumnPages::new(scratch)?;
         let (first_x, first_y) = (lowest[0], highest[1]);
+        let columns = SortedColumns::new(scratch);
         Ok(Self { lattice, first_x, first_y, size: [width, height], tiles, columns })
     }
 
     /// Returns the tile of a voxel's column, and its place in the tile.
-    fn place_of(&self, voxel: &VoxelRow) -> Result<(u64, usize)> {
+    fn place_of(&self, voxel: &VoxelRow) -> Result<(u32, u16)> {
         let (x, y) = (i64::from(voxel.index[0]) - self.first_x, self.first_y - i64::from(voxel.index[1]));
         let inside = |at: i64, k: usize| u64::try_from(at).ok().filter(|&at| at < u64::from(self.size[k]));
         let (x, y) = inside(x, 0).zip(inside(y, 1)).ok_or_else(|| {
             let reason = format!("voxel {:?} is outside of the announced bounds", voxel.index);
             Error::argument("geotiff", reason)
         })?;
-        let edge = PAGE_EDGE as u64;
-        Ok((y / edge * self.tiles[0] + x / edge, (y % edge * edge + x % edge) as usize))
+        let edge = TILE_EDGE as u64;
+        // Neither is larger: there are at most MAX_TILES tiles, of 2^16 columns.
+        Ok(((y / edge * self.tiles[0] + x / edge) as u32, (y % edge * edge + x % edge) as u16))
     }
 
-    /// Returns the three heights of a column in metres; NaN without an occupied voxel.
+    /// Returns the three heights of a column with occupied voxels, in metres.
     fn heights_of(&self, column: &Column, resolution_m: f64) -> [f32; 3] {
-        if column.count == 0 {
-            return [f32::NAN; 3];
-        }
         let height = |z: i64| self.lattice.corner_m([0, 0, z])[2];
         let mean = column.sum as f64 / f64::from(column.count) + 0.5;
         let heights_m = [
@@ -121,7 +122,7 @@ impl VoxelSink for GeoTiffSink {
         let (tile, place) = raster.place_of(voxel)?;
         if voxel.log_odds >= self.head.occupied_log_odds && self.heights.meets(voxel, self.head.resolution_m)
         {
-            raster.columns.add(tile, place, voxel.index[2])?;
+            raster.columns.add(tile, place, voxel.index[2], [voxel.tile[0], voxel.tile[1]])?;
         }
         Ok(())
     }
@@ -129,23 +130,33 @@ impl VoxelSink for GeoTiffSink {
     fn finish(mut self: Box<Self>) -> Result<()> {
         let mut raster = self.raster.take().ok_or_else(nothing_to_draw)?;
         let path = self.file.path().to_owned();
-        let mut bands: [Vec<f32>; 3] = Default::default();
-        let cells = PAGE_EDGE * PAGE_EDGE;
+        let blank = f32::NAN.to_le_bytes().repeat(TILE_EDGE * TILE_EDGE);
         // All empty tiles are one.
-        let empty = append(&mut self.file, &path, &vec![f32::NAN; cells])?;
+        let empty = append(&mut self.file, &path, &blank)?;
         let mut places: BTreeMap<u64, [(u64, u64); 3]> = BTreeMap::new();
-        for tile in raster.columns.pages() {
-            bands.iter_mut().for_each(Vec::clear);
-            let columns = raster.columns.page(tile)?;
-            for column in columns {
+        let sorted = std::mem::replace(&mut raster.columns, SortedColumns::new(&self.options.scratch_folder));
+        let mut parts = sorted.into_parts()?;
+        let mut next = parts.next()?;
+        let mut bands = [blank.clone(), blank.clone(), blank.clone()];
+        while let Some((tile, ..)) = next {
+            bands.iter_mut().for_each(|band| band.copy_from_slice(&blank));
+            while let Some((_, place, mut column)) = next.filter(|(of, ..)| *of == tile) {
+                next = parts.next()?;
+                while let Some((.., part)) = next.filter(|(of, at, _)| (*of, *at) == (tile, place)) {
+                    column.add(&part);
+                    next = parts.next()?;
+                }
                 let heights = raster.heights_of(&column, self.head.resolution_m);
-                bands.iter_mut().zip(heights).for_each(|(band, height)| band.push(height));
+                for (band, height) in bands.iter_mut().zip(heights) {
+                    let at = 4 * usize::from(place);
+                    band[at..at + 4].copy_from_slice(&height.to_le_bytes());
+                }
             }
             let mut of_tile = [empty; 3];
             for (place, band) in of_tile.iter_mut().zip(&bands) {
                 *place = append(&mut self.file, &path, band)?;
             }
-            places.insert(tile, of_tile);
+            places.insert(u64::from(tile), of_tile);
         }
         let tiles = raster.tiles[0] * raster.tiles[1];
         let place = |at: u64| places.get(&(at % tiles)).map_or(empty, |bands| bands[(at / tiles) as usize]);
@@ -182,8 +193,8 @@ impl GeoTiffSink {
             // Each band has its own tiles.
             (284, Values::Shorts(vec![2])),
             (305, Values::Text(concat!("voxtile ", env!("CARGO_PKG_VERSION")).to_owned())),
-            (322, Values::Longs(vec![PAGE_EDGE as u32])),
-            (323, Values::Longs(vec![PAGE_EDGE as u32])),
+            (322, Values::Longs(vec![TILE_EDGE as u32])),
+            (323, Values::Longs(vec![TILE_EDGE as u32])),
             (324, offsets),
             (325, lengths),
             // The second and the third band are no colours.
@@ -193,8 +204,10 @@ impl GeoTiffSink {
             (33550, Values::Doubles(vec![resolution_m, resolution_m, 0.0])),
             // The upper left corner of the image is at this point.
             (33922, Values::Doubles(vec![0.0, 0.0, 0.0, x, y, 0.0])),
-            (34735, Values::Shorts(keys)),
         ];
+        if !keys.is_empty() {
+            fields.push((34735, Values::Shorts(keys)));
+        }
         if !text.is_empty() {
             fields.push((34737, Values::Text(text)));
         }
@@ -209,13 +222,10 @@ impl GeoTiffSink {
 }
 
 /// Compresses and appends a tile of a band. Returns its offset and length.
-fn append(file: &mut TiffFile, path: &Path, heights: &[f32]) -> Result<(u64, u64)> {
+fn append(file: &mut TiffFile, path: &Path, band: &[u8]) -> Result<(u64, u64)> {
     let mut encoder = ZlibEncoder::new(Vec::new(), Compression::default());
-    let failed = |error| Error::io(path, "compress", error);
-    for height in heights {
-        encoder.write_all(&height.to_le_bytes()).map_err(failed)?;
-    }
-    let bytes = encoder.finish().map_err(failed)?;
+    let compressed = encoder.write_all(band).and_then(|()| encoder.finish());
+    let bytes = compressed.map_err(|error| Error::io(path, "compress", error))?;
     Ok((file.append(&bytes)?, bytes.len() as u64))
 }
 
@@ -226,28 +236,27 @@ fn needs_wkt(crs: &str) -> bool {
 
 /// Returns the GeoTIFF keys of a coordinate system, and their text.
 fn geo_keys(crs: Option<&str>) -> (Vec<u16>, String) {
-    // Cells are areas, not points.
-    let (mut keys, mut text) = (vec![[1025, 0, 1, 1]], String::new());
     const METRE: u16 = 9001;
     const USER_DEFINED: u16 = 32767;
-    if let Some(crs) = crs {
-        let CrsCodes { flat, vertical } = CrsCodes::of(crs);
-        match flat {
-            Some(FlatCode::Projected(code)) => {
-                keys.extend([[1024, 0, 1, 1], [3072, 0, 1, code], [3076, 0, 1, METRE]]);
-            }
-            Some(FlatCode::Geographic(code)) => keys.extend([[1024, 0, 1, 2], [2048, 0, 1, code]]),
-            Some(FlatCode::Geocentric(code)) => keys.extend([[1024, 0, 1, 3], [2048, 0, 1, code]]),
-            None => {
-                // Parts of the text end with a bar; it is ASCII.
-                let citation: String = crs.chars().filter(|c| c.is_ascii() && *c != '|').collect();
-                text = citation.chars().take(usize::from(u16::MAX) - 1).collect::<String>() + "|";
-                keys.extend([[1024, 0, 1, USER_DEFINED], [1026, 34737, text.len() as u16, 0]]);
-            }
+    let Some(crs) = crs else { return (Vec::new(), String::new()) };
+    // Cells are areas, not points.
+    let (mut keys, mut text) = (vec![[1025, 0, 1, 1]], String::new());
+    let CrsCodes { flat, vertical } = CrsCodes::of(crs);
+    match flat {
+        Some(FlatCode::Projected(code)) => {
+            keys.extend([[1024, 0, 1, 1], [3072, 0, 1, code], [3076, 0, 1, METRE]]);
         }
-        if let Some(code) = vertical {
-            keys.extend([[4096, 0, 1, code], [4099, 0, 1, METRE]]);
+        Some(FlatCode::Geographic(code)) => keys.extend([[1024, 0, 1, 2], [2048, 0, 1, code]]),
+        Some(FlatCode::Geocentric(code)) => keys.extend([[1024, 0, 1, 3], [2048, 0, 1, code]]),
+        None => {
+            // Parts of the text end with a bar; it is ASCII.
+            let citation: String = crs.chars().filter(|c| c.is_ascii() && *c != '|').collect();
+            text = citation.chars().take(usize::from(u16::MAX) - 1).collect::<String>() + "|";
+            keys.extend([[1024, 0, 1, USER_DEFINED], [1026, 34737, text.len() as u16, 0]]);
         }
+    }
+    if let Some(code) = vertical {
+        keys.extend([[4096, 0, 1, code], [4099, 0, 1, METRE]]);
     }
     keys.sort_unstable();
     let head = [1, 1, 0, keys.len() as u16];
@@ -288,15 +297,15 @@ mod tests {
     /// Returns the heights of a cell in each band.
     fn cell(file: &(Vec<u8>, BTreeMap<u64, Vec<u64>>), column: usize, row: usize) -> [f32; 3] {
         let (bytes, fields) = file;
-        let across = (fields[&256][0] as usize).div_ceil(PAGE_EDGE);
+        let across = (fields[&256][0] as usize).div_ceil(TILE_EDGE);
         let tiles = fields[&324].len() / 3;
         [0, 1, 2].map(|band| {
-            let tile = band * tiles + row / PAGE_EDGE * across + column / PAGE_EDGE;
+            let tile = band * tiles + row / TILE_EDGE * across + column / TILE_EDGE;
             let (at, length) = (fields[&324][tile] as usize, fields[&325][tile] as usize);
             let mut values = Vec::new();
             ZlibDecoder::new(&bytes[at..at + length]).read_to_end(&mut values).unwrap();
-            assert_eq!(values.len(), 4 * PAGE_EDGE * PAGE_EDGE);
-            let at = 4 * (row % PAGE_EDGE * PAGE_EDGE + column % PAGE_EDGE);
+            assert_eq!(values.len(), 4 * TILE_EDGE * TILE_EDGE);
+            let at = 4 * (row % TILE_EDGE * TILE_EDGE + column % TILE_EDGE);
             f32::from_le_bytes(values[at..at + 4].try_into().unwrap())
         })
     }
@@ -327,7 +336,7 @@ mod tests {
         let doubles = |tag: u64| file.1[&tag].iter().map(|&bits| f64::from_bits(bits)).collect::<Vec<_>>();
         assert_eq!(doubles(33550), [0.5, 0.5, 0.0]);
         assert_eq!(doubles(33922), [0.0, 0.0, 0.0, -1.5, 4.0, 0.0]);
-        assert_eq!(file.1[&34735], [1, 1, 0, 1, 1025, 0, 1, 1]);
+        assert!(!file.1.contains_key(&34735), "no keys without a coordinate system");
         let low = written(&rows, &WriteOptions { z_max_m: Some(0.5), ..options });
         assert_eq!(cell(&low, 0, 0), [-1.5, -2.0, -1.75]);
     }

@@ -10,7 +10,6 @@
 
 mod autoware;
 mod column_grid;
-mod column_pages;
 #[cfg(feature = "las")]
 mod copc;
 #[cfg(feature = "las")]
@@ -49,6 +48,7 @@ mod point_cloud2;
 mod registry;
 mod row;
 mod sort;
+mod sorted_columns;
 mod spool;
 mod stream_out;
 #[cfg(test)]
