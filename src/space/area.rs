@@ -123,13 +123,12 @@ impl Area {
                 add_ring(&mut edges, polygon, ring, corners)?;
             }
         }
-        let mut bounds_m = [[f64::INFINITY; 2], [f64::NEG_INFINITY; 2]];
+        let [mut low, mut high] = [[f64::INFINITY; 2], [f64::NEG_INFINITY; 2]];
         for edge in &edges {
-            for k in 0..2 {
-                bounds_m[0][k] = bounds_m[0][k].min(edge.low[k]).min(edge.high[k]);
-                bounds_m[1][k] = bounds_m[1][k].max(edge.low[k]).max(edge.high[k]);
-            }
+            low = [0, 1].map(|k| low[k].min(edge.low[k]).min(edge.high[k]));
+            high = [0, 1].map(|k| high[k].max(edge.low[k]).max(edge.high[k]));
         }
+        let bounds_m = [low, high];
         if edges.is_empty() {
             return Err(AreaError::Empty);
         }
