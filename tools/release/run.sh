@@ -77,7 +77,7 @@ done
 
 # Paths of this machine do not belong into binaries.
 remapped="--remap-path-prefix=$PWD=voxtile --remap-path-prefix=${CARGO_HOME:-$HOME/.cargo}=cargo"
-# What is handed out has every feature.
+# Releases have every feature.
 binaries=(--package voxtile-cli --package voxtile-share-node --package voxtile-ros2 --package workload)
 features=voxtile-cli/bucket,voxtile-cli/parquet,voxtile-ros2/zenoh
 

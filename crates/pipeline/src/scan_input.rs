@@ -203,7 +203,7 @@ fn check_together(paths: &[PathBuf], stop: &Stop) -> Result<()> {
         }
         let place = path.canonicalize();
         if place.is_err() && url_of(path).is_none() && !is_map(path, stop)? {
-            // The error says what is missing.
+            // The error names what is missing.
             registry.guess(path, &[])?;
         }
         if !places.insert(place.unwrap_or_else(|_| path.clone())) {
