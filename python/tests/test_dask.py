@@ -71,6 +71,14 @@ def test_any_regions_make_the_map_of_one_build(
     assert len(files) > 20 and all(file.stat().st_nlink == 1 for file in files)
 
 
+def test_the_tile_size_follows_the_resolution(client: object, drive: Path, tmp_path: Path) -> None:
+    options = {"resolution": 0.15, "max_range": 4.0}
+    voxtile.build(drive, tmp_path / "whole", **options)
+    voxtile_dask.build(drive, tmp_path / "map", region_size=25.0, client=client, **options)
+    assert voxtile.digest(tmp_path / "map") == voxtile.digest(tmp_path / "whole")
+    assert voxtile.open(tmp_path / "map").tile_size == 10.05
+
+
 def test_killed_workers_do_not_change_the_map(drive: Path, whole: str, tmp_path: Path) -> None:
     cluster = distributed.LocalCluster(n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None)
     killed = []

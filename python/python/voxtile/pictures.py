@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import functools
 import html
 import io
 import os
@@ -55,17 +56,27 @@ def plot(map: Map, *, region: Any = None, min_probability: float | None = None, 
     ``region`` is a box, lower and upper corner; ``ax`` are axes to draw into. Needs matplotlib. Returns the figure. A
     notebook shows it as the result of a cell, or with ``display``; in a program, ``savefig`` writes it.
     """
-    from .notebook_figure import NotebookFigure
+    from matplotlib.figure import Figure as NewFigure
 
     values, extent = heights(map, region, min_probability)
-    figure = NotebookFigure(figsize=(8, 6)) if ax is None else ax.figure
+    figure = NewFigure(figsize=(8, 6)) if ax is None else ax.figure
     axes = figure.add_subplot() if ax is None else ax
     image = axes.imshow(values, origin="lower", extent=extent, interpolation="nearest", cmap="viridis")
     axes.set_xlabel("x in m")
     axes.set_ylabel("y in m")
     axes.set_aspect("equal")
     figure.colorbar(image, ax=axes, label="height in m")
-    return axes.get_figure(root=True)  # type: ignore[return-value]
+    whole: Figure = axes.get_figure(root=True)  # type: ignore[assignment]
+    if ax is None:
+        # Notebooks show figures by themselves only after pyplot was imported.
+        setattr(whole, "_repr_png_", functools.partial(_png_of, whole))
+    return whole
+
+
+def _png_of(figure: Figure) -> bytes:
+    png = io.BytesIO()
+    figure.savefig(png, format="png", bbox_inches="tight")
+    return png.getvalue()
 
 
 def summary_html(map: Map) -> str:
@@ -92,8 +103,10 @@ def _picture_html(map: Map) -> str:
     if np.isnan(values).all():
         return ""
     png = io.BytesIO()
-    # Unknown columns are white: on a dark page, a transparent background would hide the shape of the map.
-    imsave(png, values, origin="lower", format="png", cmap=colormaps["viridis"].with_extremes(bad="white"))
+    # Unknown columns are white: on a dark page, a transparent background would hide the shape of the map. They are masked,
+    # because some versions of matplotlib take the range of colors from NaN.
+    colors = colormaps["viridis"].with_extremes(bad="white")
+    imsave(png, np.ma.masked_invalid(values), origin="lower", format="png", cmap=colors)
     return f'<img alt="from above" src="data:image/png;base64,{base64.b64encode(png.getvalue()).decode()}">'
 
 

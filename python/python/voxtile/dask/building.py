@@ -107,9 +107,8 @@ def build(
     if resolution is not None:
         settings["resolution"] = resolution
     base = _base(output, settings) if update else None
-    if base is not None:
-        tile_size = base.tile_size
-    elif (tile_size := settings.get("tile_size")) is None:
+    tile_size: float | None = settings.get("tile_size") if base is None else base.tile_size
+    if tile_size is None:
         tile_size = default_tile_size(settings.get("resolution", 0.1))
     size = advised_region_size(settings["max_range"], tile_size) if region_size is None else region_size
     _check(output, size, tile_size, settings, update)
