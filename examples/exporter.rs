@@ -29,7 +29,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let formats = OutputFormats::default();
     let format = formats.of_name("ply").ok_or("without PLY")?;
     let head = VoxelsHead::of_stream(occupied, grid.resolution_m());
-    let mut out = format.open(&head, path, &WriteOptions::beside(path))?;
+    let mut out = format.open(&head, path, &WriteOptions::for_path(path))?;
     let all = map.tile_indices().len();
     for (done, tile) in map.tiles().enumerate() {
         if stop.load(Ordering::Relaxed) {

@@ -27,7 +27,8 @@ pub fn crop(
     crop_to(map, &part, MapPath::on(map.disk(), output), new_map_id(), progress)
 }
 
-/// Like [`crop`], for a part of space over an area. Tiles beside the area are not read.
+/// Like [`crop`], for a part of space over an area. Tiles outside of the area are not read, unless the part is all other
+/// voxels.
 ///
 /// # Errors
 ///

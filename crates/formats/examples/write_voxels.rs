@@ -55,7 +55,7 @@ fn run() -> Result<(), Box<dyn std::error::Error>> {
         bounds_m,
         occupied_log_odds: 0.0,
     };
-    let mut options = WriteOptions::beside(&arguments.output);
+    let mut options = WriteOptions::for_path(&arguments.output);
     options.crs = Some(arguments.crs);
     options.origin_m = arguments.subtract_m;
     options.is_quantized = arguments.is_quantized;

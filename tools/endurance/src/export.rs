@@ -102,7 +102,7 @@ fn write_occupied(map: &MapReader, path: &Path) -> Result<u64> {
     let formats = OutputFormats::default();
     let format = formats.of_name("ply").context("PLY is not supported")?;
     let head = VoxelsHead::of_stream(count, grid.resolution_m());
-    let mut sink = format.open(&head, path, &WriteOptions::beside(path))?;
+    let mut sink = format.open(&head, path, &WriteOptions::for_path(path))?;
     let mut written = Ok(());
     map.for_each_occupied(None, None, |voxel| {
         if written.is_ok() {

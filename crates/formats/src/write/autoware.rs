@@ -145,7 +145,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("cloud");
         let rows = [row([0, 0, 0], 0.9), row([-1, 39, 0], 0.8), row([40, 0, 0], 0.9), row([1, 1, 1], 0.7)];
-        let options = WriteOptions::beside(&path);
+        let options = WriteOptions::for_path(&path);
         let mut sink = Box::new(AutowareSink::create(&head_of(&rows), &path, &options).unwrap());
         rows.iter().for_each(|row| sink.put(row).unwrap());
         sink.finish().unwrap();
@@ -167,7 +167,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let mut voxel = row([0; 3], 0.9);
         voxel.center_m = [500_123.4, 40_182_321.7, 57.3];
-        let mut options = WriteOptions::beside(&folder.path().join("cloud"));
+        let mut options = WriteOptions::for_path(&folder.path().join("cloud"));
         let mut sink = AutowareSink::create(&head_of(&[]), &folder.path().join("a"), &options).unwrap();
         assert!(sink.put(&voxel).unwrap_err().to_string().contains("origin"));
         options.origin_m = [500_000.0, 40_182_000.0, 0.0];

@@ -235,7 +235,7 @@ mod tests {
         let rows: Vec<_> =
             (0..200).flat_map(|x| (0..200).map(move |y| row([x - 100, y, x / 3], 0.9))).collect();
         let mut sink =
-            Box::new(CopcSink::create(&head_of(&rows), &path, &WriteOptions::beside(&path)).unwrap());
+            Box::new(CopcSink::create(&head_of(&rows), &path, &WriteOptions::for_path(&path)).unwrap());
         rows.iter().for_each(|row| sink.put(row).unwrap());
         sink.finish().unwrap();
         let bytes = std::fs::read(&path).unwrap();

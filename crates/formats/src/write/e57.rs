@@ -95,7 +95,7 @@ mod tests {
     fn crs_read_back(crs: &str) -> Result<Option<String>> {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.e57");
-        let options = WriteOptions { crs: Some(crs.to_owned()), ..WriteOptions::beside(&path) };
+        let options = WriteOptions { crs: Some(crs.to_owned()), ..WriteOptions::for_path(&path) };
         let voxel = row([1, 2, 3], 0.75);
         let mut sink = Box::new(E57Sink::create(&head_of(&[voxel]), &path, &options)?);
         sink.put(&voxel).unwrap();
@@ -119,7 +119,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.e57");
         let rows: Vec<_> = (0..5000).map(|k| row([k, -k, 3], 0.75)).collect();
-        let options = WriteOptions::beside(&path);
+        let options = WriteOptions::for_path(&path);
         let mut sink = Box::new(E57Sink::create(&head_of(&rows), &path, &options).unwrap());
         rows.iter().for_each(|row| sink.put(row).unwrap());
         sink.finish().unwrap();

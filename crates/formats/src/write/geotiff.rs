@@ -313,7 +313,7 @@ mod tests {
     #[test]
     fn heights_are_those_of_the_occupied_voxels_of_a_column() {
         let folder = tempfile::tempdir().unwrap();
-        let options = WriteOptions::beside(&folder.path().join("dem.tif"));
+        let options = WriteOptions::for_path(&folder.path().join("dem.tif"));
         // Voxels of 0.5 m in three of the image's tiles; the free one does not count.
         let rows = [
             row([-3, 7, -4], 0.9),
@@ -353,7 +353,7 @@ mod tests {
         assert_eq!(keys(both)[16..], [3076, 0, 1, 9001, 4096, 0, 1, 7837, 4099, 0, 1, 9001]);
         // A system without a code is text, in a file that GDAL reads too.
         let folder = tempfile::tempdir().unwrap();
-        let mut options = WriteOptions::beside(&folder.path().join("dem.tif"));
+        let mut options = WriteOptions::for_path(&folder.path().join("dem.tif"));
         options.crs = Some("LOCAL_CS[\"hall <1>\"]".to_owned());
         let (_, fields) = written(&[row([0; 3], 0.9)], &options);
         assert_eq!(fields[&34735], [1, 1, 0, 3, 1024, 0, 1, 32767, 1025, 0, 1, 1, 1026, 34737, 21, 0]);
@@ -365,7 +365,7 @@ mod tests {
     #[test]
     fn images_that_are_too_large_are_refused() {
         let folder = tempfile::tempdir().unwrap();
-        let options = WriteOptions::beside(&folder.path().join("dem.tif"));
+        let options = WriteOptions::for_path(&folder.path().join("dem.tif"));
         let mut head = head_of(&[row([0; 3], 0.9)]);
         head.voxels = 1;
         for far in [1e6, f64::MAX] {

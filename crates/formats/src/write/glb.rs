@@ -282,7 +282,7 @@ mod tests {
     fn faces(rows: &[VoxelRow], is_quantized: bool) -> Vec<([i64; 3], [i64; 3])> {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.glb");
-        let options = WriteOptions { is_quantized, ..WriteOptions::beside(&path) };
+        let options = WriteOptions { is_quantized, ..WriteOptions::for_path(&path) };
         let mut sink = Box::new(GlbSink::create(&head_of(rows), &path, &options).unwrap());
         rows.iter().for_each(|row| sink.put(row).unwrap());
         sink.finish().unwrap();

@@ -140,7 +140,7 @@ mod tests {
     #[test]
     fn only_requested_heights_are_used() {
         let folder = tempfile::tempdir().unwrap();
-        let all = WriteOptions::beside(&folder.path().join("heights.png"));
+        let all = WriteOptions::for_path(&folder.path().join("heights.png"));
         // The voxel at 2.75 m is excluded, so the one below it is the topmost.
         assert_eq!(values(&WriteOptions { z_max_m: Some(2.5), ..all.clone() }), [0, 4, 0, 0, 1, 0]);
         assert_eq!(values(&WriteOptions { z_min_m: Some(0.5), ..all }), [0, 0, 0, 0, 9, 0]);
@@ -150,7 +150,7 @@ mod tests {
     fn topmost_occupied_voxel_is_used() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("heights.png");
-        assert_eq!(values(&WriteOptions::beside(&path)), [0, 4, 0, 0, 9, 0]);
+        assert_eq!(values(&WriteOptions::for_path(&path)), [0, 4, 0, 0, 9, 0]);
         let text = std::fs::read_to_string(folder.path().join("heights.json")).unwrap();
         let scale: serde_json::Value = serde_json::from_str(&text).unwrap();
         let height =

@@ -98,7 +98,7 @@ mod tests {
         let rows: Vec<_> = (0..300).map(|k| row([k - 150, 7 * k, -k], 0.9)).collect();
         for is_compressed in [false, true] {
             let path = folder.path().join(if is_compressed { "a.laz" } else { "a.las" });
-            let mut options = WriteOptions::beside(&path);
+            let mut options = WriteOptions::for_path(&path);
             options.crs = Some("LOCAL_CS[\"hall\"]".to_owned());
             let mut sink =
                 Box::new(LasSink::create(&head_of(&rows), &path, &options, is_compressed).unwrap());

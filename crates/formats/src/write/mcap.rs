@@ -118,7 +118,7 @@ mod tests {
         // Tiles of 16 voxels along x: 16 points each, and one with 64 points, which is split.
         let mut rows: Vec<_> = (0..48).map(|x| row([x, 0, 0], 0.9)).collect();
         rows.extend((0..4).flat_map(|y| (48..64).map(move |x| row([x, y, 0], 0.9))));
-        let mut sink = McapSink::create(&head_of(&rows), &path, &WriteOptions::beside(&path)).unwrap();
+        let mut sink = McapSink::create(&head_of(&rows), &path, &WriteOptions::for_path(&path)).unwrap();
         sink.max_points = 40;
         rows.iter().for_each(|row| sink.put(row).unwrap());
         Box::new(sink).finish().unwrap();

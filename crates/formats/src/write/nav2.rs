@@ -77,7 +77,7 @@ mod tests {
     fn map(rows: &[VoxelRow], z_m: [Option<f64>; 2]) -> Vec<String> {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("map.pgm");
-        let options = WriteOptions { z_min_m: z_m[0], z_max_m: z_m[1], ..WriteOptions::beside(&path) };
+        let options = WriteOptions { z_min_m: z_m[0], z_max_m: z_m[1], ..WriteOptions::for_path(&path) };
         let mut sink = Box::new(Nav2Sink::create(&head_of(rows), &path, &options).unwrap());
         for row in rows {
             sink.put(row).unwrap();

@@ -103,7 +103,7 @@ mod tests {
             occupied_log_odds: 0.0,
         };
         let zip = ZipStore::create(&path).unwrap().with_zip64_from(zip64_from);
-        let mut sink = Box::new(NpzSink::in_zip(zip, &head, &WriteOptions::beside(&path)).unwrap());
+        let mut sink = Box::new(NpzSink::in_zip(zip, &head, &WriteOptions::for_path(&path)).unwrap());
         for x in [0.25, 0.75] {
             let voxel = VoxelRow {
                 index: [(2.0 * x) as i32, 0, 0],

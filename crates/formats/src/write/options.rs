@@ -34,7 +34,7 @@ pub struct WriteOptions {
 
 impl WriteOptions {
     /// Creates options for an output path. Companion and temporary files are in its folder.
-    pub fn beside(final_path: &Path) -> Self {
+    pub fn for_path(final_path: &Path) -> Self {
         let folder = match final_path.parent() {
             Some(folder) if !folder.as_os_str().is_empty() => folder.to_owned(),
             _ => PathBuf::from("."),
@@ -97,7 +97,7 @@ mod tests {
             let folder = tempfile::tempdir().unwrap();
             let path = folder.path().join(name);
             let format = *OutputFormats::default().of_name(format).unwrap();
-            let opened = format.open(&head_of(&rows), &path, &WriteOptions::beside(&path));
+            let opened = format.open(&head_of(&rows), &path, &WriteOptions::for_path(&path));
             let error = opened.err().map(|error| error.to_string()).unwrap_or_default();
             assert!(error.contains(name) && error.contains(hint), "{name}: {error:?}");
             assert!(!path.exists());

@@ -33,7 +33,7 @@ pub fn write_voxels(format: &str, path: &Path, crs: Option<&str>) {
         bounds_m: [bound(f64::min), bound(f64::max)],
         occupied_log_odds: 0.0,
     };
-    let options = WriteOptions { crs: crs.map(str::to_owned), ..WriteOptions::beside(path) };
+    let options = WriteOptions { crs: crs.map(str::to_owned), ..WriteOptions::for_path(path) };
     let mut sink = format_of(format).open(&head, path, &options).unwrap();
     (0..VOXELS).for_each(|k| sink.put(&voxel(k)).unwrap());
     sink.finish().unwrap();

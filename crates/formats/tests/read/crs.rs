@@ -54,7 +54,7 @@ fn invalid_epsg_codes_are_refused() {
     let path = folder.path().join("a.las");
     let head = VoxelsHead::of_stream(0, 0.5);
     for crs in ["EPSG:", "EPSG:100000", "EPSG:4326+5773"] {
-        let options = WriteOptions { crs: Some(crs.to_owned()), ..WriteOptions::beside(&path) };
+        let options = WriteOptions { crs: Some(crs.to_owned()), ..WriteOptions::for_path(&path) };
         let error = format_of("las").open(&head, &path, &options).err().unwrap();
         assert!(format!("{error:#}").contains(crs), "{error}");
     }

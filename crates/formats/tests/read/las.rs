@@ -164,7 +164,7 @@ fn compressed_files_may_be_empty() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("empty.laz");
     let head = VoxelsHead::of_stream(0, 0.5);
-    let sink = format_of("laz").open(&head, &path, &WriteOptions::beside(&path)).unwrap();
+    let sink = format_of("laz").open(&head, &path, &WriteOptions::for_path(&path)).unwrap();
     sink.finish().unwrap();
     assert_eq!(clouds(&path).iter().map(|(_, points)| points.len()).sum::<usize>(), 0);
 }

@@ -17,7 +17,7 @@ pub(super) fn export(export: &Export<'_>) -> anyhow::Result<ExportSummary> {
         let chosen = Chosen::of(export, map.config().occupied_log_odds());
         let head = head_of(&chosen, map)?;
         let staged = StagedOutput::beside(&options.output)?;
-        let mut how = WriteOptions::beside(&options.output);
+        let mut how = WriteOptions::for_path(&options.output);
         how.crs.clone_from(&map.config().crs);
         how.companion_folder = staged.folder().to_owned();
         (how.z_min_m, how.z_max_m) = (options.z_min_m, options.z_max_m);

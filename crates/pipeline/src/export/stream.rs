@@ -77,7 +77,7 @@ fn open<'a>(
     out: &'a mut dyn Write,
 ) -> Result<Box<dyn VoxelSink + 'a>> {
     let head = VoxelsHead::of_stream(voxels, grid.resolution_m());
-    let mut options = WriteOptions::beside(&export.options.output);
+    let mut options = WriteOptions::for_path(&export.options.output);
     options.origin_m = origin.corner_m;
     export.format.open_stream(&head, out, &options)
 }

@@ -116,7 +116,7 @@ impl Tileset<'_> {
             bounds_m: [[0.0; 3]; 2],
             occupied_log_odds: 0.0,
         };
-        let mut options = WriteOptions::beside(&path);
+        let mut options = WriteOptions::for_path(&path);
         // Coordinates are relative to the node's corner.
         options.colour_heights_m = Some(heights_m.map(|height| height - corner_m[2]));
         // Viewers of 3D Tiles support quantized positions, which make the folder a fifth smaller.

@@ -134,7 +134,8 @@ proptest! {
             let bounds = levels.bounds_m(&store, key);
             for voxel in voxels.keys() {
                 // Bounds are clipped to the tiles of the map, so a coarse voxel may be only partly inside. If the
-                // tile's size is not a multiple of the voxel's size, one beside an occupied voxel may be outside.
+                // tile's size is not a multiple of the coarse voxel's size, a coarse voxel without an occupied voxel
+                // may exist next to the border, outside of the bounds.
                 let low = voxel.map(|at| 0.5 * at as f64);
                 let high = voxel.map(|at| 0.5 * (at + (1 << key.level)) as f64);
                 let overlaps = (0..3).all(|k| bounds.min[k] < high[k] && low[k] < bounds.max[k]);
