@@ -295,6 +295,28 @@ fn a_power_cut_after_a_kill_keeps_the_last_flush() {
     sweep_after_kills(&Build::of(config()), 4, |at| vec![at % 17, 7 + at % 89]);
 }
 
+/// Other tests take samples of the fault points; this one takes each, because a map with `metadata.json` but without its
+/// log is damaged.
+#[test]
+fn a_power_cut_during_creation_leaves_no_map_or_an_empty_one() {
+    for change in 0.. {
+        let disk = FaultyDisk::new(Fault::Crashes(change));
+        let created = OutOfCoreTileMapper::create(at(&disk), config());
+        if !disk.has_crashed() {
+            assert!(created.is_ok() && change > 8, "{change}");
+            break;
+        }
+        drop(created);
+        for unsynced in [Unsynced::Dropped, Unsynced::Kept].into_iter().chain((0..32).map(Unsynced::Shuffled))
+        {
+            let left = disk.after_crash(unsynced);
+            let found = MapReader::open(at(&left), 0).map(|reader| reader.scan_number());
+            assert!(matches!(found, Ok(0) | Err(Error::NoMap { .. })), "{change}, {unsynced:?}: {found:?}");
+            assert_eq!(open_or_create(&left, &config()).unwrap().scan_number(), 0, "{change}, {unsynced:?}");
+        }
+    }
+}
+
 #[test]
 fn a_second_power_cut_while_opening_keeps_the_last_flush() {
     for config in [config(), compact()] {

@@ -19,7 +19,7 @@ pub(crate) enum FlatCode {
 
 /// EPSG codes of geographic and geocentric systems. The latter have metres, as maps do.
 const GEODETIC: std::ops::Range<u16> = 4000..5000;
-/// Codes from here on are reserved in GeoTIFF.
+/// First code that GeoTIFF reserves for other uses.
 const END: u16 = 32767;
 
 const PROJECTED: [&str; 3] = ["PROJCS", "PROJCRS", "PROJECTEDCRS"];
@@ -31,7 +31,7 @@ const BASES: [&str; 6] =
     ["BASEGEOGCRS", "BASEGEODCRS", "BASEPROJCRS", "BASEVERTCRS", "TARGETCRS", "SOURCEEPOCH"];
 
 /// Returns the EPSG code of the system of x and y that a map or a file names, as `EPSG:25832` or as well-known text;
-/// `None` if it has none.
+/// `None` if the system has no code.
 pub fn epsg_code(crs: &str) -> Option<u16> {
     CrsCodes::of(crs)
         .flat

@@ -106,10 +106,10 @@ fn is_pcd(format: &InputFormat) -> bool {
     format.name == "pcd"
 }
 
-/// What files of one input have in common.
+/// Properties that are equal for all files of one input.
 #[derive(Clone, Debug, PartialEq)]
 struct Family<'p> {
-    /// LAS and LAZ files have the same, so they may be mixed.
+    /// Extensions of the format. LAS and LAZ are one format here, so they may be mixed.
     extensions: &'static [&'static str],
     folder: Option<&'p Path>,
     /// Beginning of the names of the parts of a recording.

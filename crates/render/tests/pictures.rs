@@ -310,7 +310,7 @@ fn moving_points_cover_the_map() {
         assert_eq!(cell(&drawn, moving), colors::MOVING, "{moving:?}");
     }
     assert_eq!(cell(&drawn, [5, 3]), colors::color_of(0.0));
-    // Scan by scan, the picture is the same.
+    // The picture is the same if the points are added in several calls.
     let parts: Vec<&[Point]> = points.chunks(1).collect();
     assert_eq!(finish(&plain(), &parts).image, drawn.image);
     assert_eq!(draw(&plain(), &map).moving_points, None);

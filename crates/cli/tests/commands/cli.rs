@@ -490,7 +490,7 @@ fn a_map_of_any_resolution_has_tiles_of_nearly_10_m() {
     assert_eq!(digest("default", &[]), digest("given", &["--resolution", "0.1", "--tile-size", "10"]));
     let found = digest("found", &["--resolution", "0.15"]);
     assert_eq!(found, digest("same", &["--resolution", "0.15", "--tile-size", "10.05"]));
-    // Its scans can be added without the options, and with the same resolution.
+    // Scans can be added without `--resolution`, and with the map's own.
     let map = folder.path().join("found");
     for same in [&[][..], &["--resolution", "0.15"]] {
         let again = ["build", text(&scans), "-o", text(&map), "--append", "--again"];

@@ -416,4 +416,22 @@ fn what_moved_is_marked_exported_and_unmarked() {
     assert!(here.status.success(), "{}", String::from_utf8_lossy(&here.stderr));
     let here: serde_json::Value = serde_json::from_slice(&here.stdout).unwrap();
     assert_eq!(here["kept_as"], serde_json::Value::Null);
+
+    // The removal of earlier marks does not read a far scan, but the search does, and the scan is damaged.
+    output(&["clean", &map]);
+    let (far_scan, far_poses) = (path("far.xyz"), path("far.txt"));
+    let far: String = (0..200).map(|k| format!("5 {} 1\n", 0.1 * f64::from(k))).collect();
+    fs::write(&far_scan, far).unwrap();
+    fs::write(&far_poses, "1 0 0 500 0 1 0 0 0 0 1 0\n").unwrap();
+    output(&["build", &far_scan, "--poses", &far_poses, "-o", &map, "--append"]);
+    let segments =
+        fs::read_dir(Path::new(&map).join("kept_scans")).unwrap().map(|entry| entry.unwrap().path());
+    let number = |path: &PathBuf| path.extension().and_then(|number| number.to_str()?.parse::<u64>().ok());
+    let newest = segments.filter(|path| path.file_stem().unwrap() == "segment").max_by_key(number).unwrap();
+    let mut bytes = fs::read(&newest).unwrap();
+    *bytes.last_mut().unwrap() ^= 1;
+    fs::write(&newest, bytes).unwrap();
+    let message = fails(&["clean", &map], 1);
+    assert!(message.contains("the earlier marks are removed"), "{message}");
+    assert_eq!(json(&["scans", &map, "--json"])["moving_points"], 0);
 }

@@ -124,7 +124,7 @@ fn recordings_are_inputs_of_their_own() {
     // The map knows each of them.
     let (code, message) = refusal(&[&b], &map, &["--append"]);
     assert!(code == 2 && message.contains("second.log: the map already has 2 scans"), "{message}");
-    // Those that the map has are passed, with the settings that they were begun with.
+    // Inputs that are in the map already are skipped.
     let more = build(&[&a, &b, &c], &map, &["--resume"]);
     assert_eq!((&more["scans"], &more["resumed_after"]), (&2.into(), &4.into()));
     assert_eq!(names(&map), ["first.log", "second.log", "third.log"]);

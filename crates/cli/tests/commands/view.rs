@@ -330,7 +330,7 @@ fn points_marked_as_moving_are_served() {
     }
     let (marked, version, _, points) = viewer.moving("maps/0/moving.bin");
     assert!(marked as usize == points.len() && version != before);
-    // Of the third scan, what is nearer than the wall.
+    // The points of the third scan that are nearer than the wall.
     let scan = fs::read_to_string(folder.path().join("scans/2.xyz")).unwrap();
     let parsed = scan.lines().map(|line| {
         let mut numbers = line.split(' ').map(|k| (1000.0 * k.parse::<f64>().unwrap()).round() as i64);

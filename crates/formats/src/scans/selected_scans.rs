@@ -90,7 +90,7 @@ struct SelectedScans {
     /// Number of scans of this source and those before it that were skipped or used.
     passed: u64,
     taken: u64,
-    /// The two numbers before this source.
+    /// Values of `passed` and `taken` at the begin of this source.
     earlier: [u64; 2],
     /// Number of skipped scans that could not be read.
     bad: u64,

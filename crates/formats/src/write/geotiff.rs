@@ -39,7 +39,7 @@ pub(super) struct GeoTiffSink {
 /// Place of the image, and its columns.
 struct Raster {
     lattice: Lattice,
-    /// First column along x, and the one along y that the first row has.
+    /// Indices of the voxels in the upper left cell: the lowest along x, the highest along y.
     first_x: i64,
     first_y: i64,
     /// Columns and rows.
@@ -187,7 +187,7 @@ impl GeoTiffSink {
             (258, Values::Shorts(vec![32; 3])),
             // Deflate.
             (259, Values::Shorts(vec![8])),
-            // Small values are dark.
+            // Photometric interpretation: small values are dark.
             (262, Values::Shorts(vec![1])),
             (277, Values::Shorts(vec![3])),
             // Each band has its own tiles.

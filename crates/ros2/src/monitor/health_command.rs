@@ -64,9 +64,6 @@ fn asked(ListenAddress(address): ListenAddress, timeout: Duration) -> io::Result
     match status.split(' ').nth(1) {
         Some("200") => Ok((true, body.trim().to_owned())),
         Some("503") => Ok((false, body.trim().to_owned())),
-        _ => Err(io::Error::other(format!(
-            "{:?} is not a response of voxtile-ros2",
-            status.escape_debug().to_string()
-        ))),
+        _ => Err(io::Error::other(format!("{status:?} is not a response of voxtile-ros2"))),
     }
 }

@@ -3,11 +3,11 @@ use super::value::Value;
 /// Effect in this node of a parameter of octomap_server, or of every node of ROS 2, that is not an option.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Effect {
-    /// None: the map and the topics are the same.
+    /// The map and the topics are the same.
     None,
     /// The map is the same; topics differ as the text says.
     Topics(&'static str),
-    /// The map would be another one than that of octomap_server.
+    /// The map would differ from that of octomap_server.
     Refused(&'static str),
 }
 

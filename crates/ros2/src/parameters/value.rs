@@ -43,7 +43,7 @@ impl<'de> Deserialize<'de> for Placed {
     }
 }
 
-// `untagged` would lose the lines.
+// Written by hand, because serde's `untagged` would lose the line numbers.
 impl<'de> Deserialize<'de> for Value {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         let depth = DEPTH.get();
