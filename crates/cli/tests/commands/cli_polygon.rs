@@ -15,7 +15,7 @@ fn floor(folder: &TempDir) -> PathBuf {
         grid.flat_map(|(x, y)| [0.1, 3.1].map(|z| (0.25 * f64::from(x) - 3.9, 0.25 * f64::from(y) - 3.9, z)));
     let text_of = |(x, y, z): (f64, f64, f64)| format!("{x} {y} {z}\n");
     fs::write(&points, rows.map(text_of).collect::<String>()).unwrap();
-    let options = ["--no-rays", "--resolution", "0.25", "--tile-size", "2"];
+    let options = ["--no-rays", "--poses", "identity", "--resolution", "0.25", "--tile-size", "2"];
     output(&[&["build", text(&points), "-o", text(&map)][..], &options].concat());
     map
 }
