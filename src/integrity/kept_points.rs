@@ -31,26 +31,42 @@ impl KeptLocations {
     }
 }
 
-/// Points and marks that were read and are intact, so that points which a map and its snapshots share are read once. Scans are
-/// contiguous, so there are few ranges.
+/// Points and marks that were read and are intact, so that what a map and its snapshots share is read once.
 #[derive(Debug, Default)]
 pub(super) struct WholePoints {
-    /// End of each range, by segment and start.
-    ranges: BTreeMap<(u64, u64), u64>,
+    points: WholeRanges,
+    marks: WholeRanges,
 }
 
 impl WholePoints {
-    /// Checks the points of a scan and their marks, if they were not checked before.
+    /// Checks the points of a scan, if they were not checked before.
     ///
     /// # Errors
     ///
     /// Damage or an I/O error.
     pub(super) fn check(&mut self, disk: &dyn Disk, layout: &Layout, scan: &KeptRecord) -> Result<()> {
-        self.check_once(scan.place, || check_points(disk, layout, scan))?;
-        let marks = scan.moving.map(|marks| marks.place);
-        marks.map_or(Ok(()), |place| self.check_once(place, || read_marks(disk, layout, scan).map(drop)))
+        self.points.check_once(scan.place, || check_points(disk, layout, scan))
     }
 
+    /// Checks the marks of a scan, if it has any and they were not checked before.
+    ///
+    /// # Errors
+    ///
+    /// Damage or an I/O error.
+    pub(super) fn check_marks(&mut self, disk: &dyn Disk, layout: &Layout, scan: &KeptRecord) -> Result<()> {
+        let Some(place) = scan.moving.and_then(|marks| marks.place) else { return Ok(()) };
+        self.marks.check_once(place, || read_marks(disk, layout, scan).map(drop))
+    }
+}
+
+/// Intact ranges of segments. Scans are contiguous, so there are few.
+#[derive(Debug, Default)]
+struct WholeRanges {
+    /// End of each range, by segment and start.
+    ranges: BTreeMap<(u64, u64), u64>,
+}
+
+impl WholeRanges {
     fn check_once(&mut self, place: SegmentPlace, check: impl FnOnce() -> Result<()>) -> Result<()> {
         let SegmentPlace { segment, offset, bytes } = place;
         let end = offset.saturating_add(bytes);

@@ -2,8 +2,8 @@ use super::finding::Finding;
 use super::kept_points::{KeptLocations, WholePoints};
 use crate::error::{Error, Result};
 use crate::store::{
-    CatalogEntry, Disk, KeptAsOf, KeptRecords, Layout, Salvaged, ScanRecord, SegmentPlace, SnapshotName,
-    TileStore, kept_as_of, salvage_entries, whole_fronts,
+    CatalogEntry, Disk, KeptAsOf, KeptMarks, KeptRecords, Layout, Salvaged, ScanRecord, SegmentPlace,
+    SnapshotName, TileStore, kept_as_of, salvage_entries, whole_fronts,
 };
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
@@ -98,7 +98,9 @@ impl Check<'_> {
             {
                 continue;
             }
-            if let Err(error) = self.whole.check(self.disk, self.layout, &scan) {
+            let of_points = self.whole.check(self.disk, self.layout, &scan);
+            let of_marks = self.whole.check_marks(self.disk, self.layout, &scan);
+            for error in [of_points, of_marks].into_iter().filter_map(Result::err) {
                 self.reported.insert(scan.place);
                 self.report(error, needed, Some((scan.number, scan.place)))?;
             }
@@ -151,12 +153,14 @@ pub(super) struct WholeEntries {
     pub damage: Vec<Error>,
     /// Number of scans from which the map can no longer be replayed.
     pub scans_lost: u64,
+    /// Number of other scans whose marks of moving points are lost.
+    pub marks_lost: u64,
     /// Segments of the intact scans.
     pub segments: BTreeSet<u64>,
 }
 
-/// Passes the entries of a repaired catalog to `put`: a scan with damaged points becomes a scan without points, and a
-/// scan with a damaged record becomes an unlisted one.
+/// Passes the entries of a repaired catalog to `put`: a scan with damaged points becomes a scan without points, one with
+/// damaged marks has unknown marks, and a scan with a damaged record becomes an unlisted one.
 ///
 /// # Errors
 ///
@@ -175,8 +179,13 @@ pub(super) fn whole_entries(
                 whole.scans_lost += entry.numbers().map_or(0, |(first, last)| last - first + 1);
                 entry
             }
-            Salvaged::Whole(CatalogEntry::Kept(scan)) => match points.check(disk, layout, &scan) {
+            Salvaged::Whole(CatalogEntry::Kept(mut scan)) => match points.check(disk, layout, &scan) {
                 Ok(()) => {
+                    if let Err(error) = points.check_marks(disk, layout, &scan) {
+                        whole.damage.push(only_damage(error)?);
+                        whole.marks_lost += 1;
+                        scan.moving = scan.moving.map(|marks| KeptMarks { place: None, ..marks });
+                    }
                     whole.segments.extend(scan.places().map(|place| place.segment));
                     CatalogEntry::Kept(scan)
                 }

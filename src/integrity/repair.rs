@@ -65,6 +65,9 @@ pub struct Repair {
     pub scans_lost: u64,
     /// Like `scans_lost`, for the kept scans of snapshots.
     pub snapshot_scans_lost: u64,
+    /// Number of kept scans of the map and of snapshots with damaged marks of moving points. The map can be replayed
+    /// after its moving points are marked again, or all marks are removed.
+    pub marks_lost: u64,
     /// Number of tiles lost from the map. Their space is unknown again.
     pub tiles_lost: u64,
     /// Number of inputs removed from the metadata, because the tiles may lack some of their scans.
@@ -78,7 +81,7 @@ pub struct Repair {
 impl Repair {
     /// Returns whether nothing was lost from the map and its snapshots, and no damage remains.
     pub fn is_complete(&self) -> bool {
-        let scans_lost = self.scans_lost + self.snapshot_scans_lost;
+        let scans_lost = self.scans_lost + self.snapshot_scans_lost + self.marks_lost;
         let lost = self.tiles_lost + scans_lost + self.snapshot_tiles_lost + self.snapshots_lost;
         lost + self.inputs_forgotten + self.left == 0
     }

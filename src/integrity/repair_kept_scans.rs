@@ -49,12 +49,8 @@ impl<F: FnMut(&Action), P: FnMut(u64, u64)> Repairer<'_, F, P> {
             }
         }
         self.counts.scans_lost += left.scans_lost;
-        let reason = match left.scans_lost {
-            0 => "a damaged record was dropped from its catalog".to_owned(),
-            lost => {
-                format!("{lost} damaged scans are no longer kept; the map cannot be replayed")
-            }
-        };
+        self.counts.marks_lost += left.marks_lost;
+        let reason = forgotten(&left, "its catalog", "the map");
         self.note(ActionKind::Forgotten, &folder, reason);
         Ok(())
     }
@@ -101,8 +97,8 @@ impl<F: FnMut(&Action), P: FnMut(u64, u64)> Repairer<'_, F, P> {
             reasons.add(&found);
             let old = store.archive().catalog_path(as_of)?;
             let is_old_kept = self.keep_catalog(old.as_deref(), &reasons)?;
-            let scans_lost = self.write_other_catalog(store, snapshot, as_of)?;
-            replaced.push(Replaced { at, old, is_old_kept, scans_lost });
+            let left = self.write_other_catalog(store, snapshot, as_of)?;
+            replaced.push(Replaced { at, old, is_old_kept, left });
         }
         if replaced.is_empty() {
             return Ok(());
@@ -113,7 +109,7 @@ impl<F: FnMut(&Action), P: FnMut(u64, u64)> Repairer<'_, F, P> {
             replaced.iter().any(|replaced| replaced.old.as_deref() == Some(path))
         })?;
         for replaced in &replaced {
-            self.name_other_catalog(store, &snapshots[replaced.at], replaced.scans_lost)?;
+            self.name_other_catalog(store, &snapshots[replaced.at], &replaced.left)?;
         }
         self.quarantine_unneeded(store, snapshots, &reasons, |path| {
             replaced.iter().any(|replaced| replaced.is_old_kept && replaced.old.as_deref() == Some(path))
@@ -137,38 +133,34 @@ impl<F: FnMut(&Action), P: FnMut(u64, u64)> Repairer<'_, F, P> {
         Ok(())
     }
 
-    /// Writes a repaired catalog of the scans that a snapshot keeps. The snapshot's file does not name it yet. Returns
-    /// the number of damaged scans that it omits.
+    /// Writes a repaired catalog of the scans that a snapshot keeps, and returns its content. The snapshot's file does not
+    /// name it yet.
     fn write_other_catalog(
         &mut self,
         store: &mut TileStore,
         snapshot: &mut Snapshot,
         as_of: KeptAsOf,
-    ) -> Result<u64> {
-        let mut scans_lost = 0;
+    ) -> Result<WholeEntries> {
+        let mut left = WholeEntries::default();
         let (disk, layout, points) = (self.disk, &self.layout, &mut self.points);
         let catalog = store.snapshot_writer().write_catalog(|put| {
-            scans_lost = whole_entries(disk, layout, as_of, points, put)?.scans_lost;
+            left = whole_entries(disk, layout, as_of, points, put)?;
             Ok(())
         })?;
         snapshot.commits.catalog = Some(catalog);
-        Ok(scans_lost)
+        Ok(left)
     }
 
     fn name_other_catalog(
         &mut self,
         store: &mut TileStore,
         snapshot: &Snapshot,
-        scans_lost: u64,
+        left: &WholeEntries,
     ) -> Result<()> {
         store.snapshot_writer().replace(snapshot)?;
-        self.counts.snapshot_scans_lost += scans_lost;
-        let reason = match scans_lost {
-            0 => "a damaged record was dropped from the catalog of its kept scans".to_owned(),
-            lost => {
-                format!("{lost} damaged scans are no longer kept; the snapshot cannot be replayed")
-            }
-        };
+        self.counts.snapshot_scans_lost += left.scans_lost;
+        self.counts.marks_lost += left.marks_lost;
+        let reason = forgotten(left, "the catalog of its kept scans", "the snapshot");
         self.note(ActionKind::Forgotten, &self.layout.snapshot(&snapshot.name), reason);
         Ok(())
     }
@@ -220,7 +212,20 @@ struct Replaced {
     old: Option<PathBuf>,
     /// Whether quarantine has a copy of the damaged catalog.
     is_old_kept: bool,
-    scans_lost: u64,
+    /// Content of the new catalog.
+    left: WholeEntries,
+}
+
+/// Describes what is missing in a new catalog.
+fn forgotten(left: &WholeEntries, catalog: &str, whose: &str) -> String {
+    match (left.scans_lost, left.marks_lost) {
+        (0, 0) => format!("a damaged record was dropped from {catalog}"),
+        (0, lost) => {
+            let until = "until its moving points are marked again, or all marks are removed";
+            format!("the marks of moving points of {lost} scans are lost; {whose} cannot be replayed {until}")
+        }
+        (lost, _) => format!("{lost} damaged scans are no longer kept; {whose} cannot be replayed"),
+    }
 }
 
 /// Reasons for damage of files of kept scans.

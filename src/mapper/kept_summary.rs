@@ -40,6 +40,8 @@ pub struct KeptScanHead {
     pub points: u64,
     /// Number of points that are marked as moving.
     pub moving_points: u64,
+    /// Whether it is unknown which points these are, because `repair` found the marks damaged.
+    pub has_lost_marks: bool,
     /// Segments that contain its points and marks.
     pub(crate) segments: [u64; 2],
 }
@@ -100,6 +102,23 @@ impl KeptSummary {
         }
     }
 
+    /// Checks that the marks of moving points of all scans are known, except of those whose marks are no longer needed.
+    ///
+    /// # Errors
+    ///
+    /// Fails if `repair` found the marks of another scan damaged: replayed tiles would not match the others.
+    pub(crate) fn check_marks(&self, is_renewed: impl Fn(u64) -> bool) -> Result<()> {
+        let lost = self.heads.iter().find(|scan| scan.has_lost_marks && !is_renewed(scan.number));
+        lost.map_or(Ok(()), |scan| {
+            let reason = format!(
+                "the marks of moving points of scan {} are lost to damage; mark the moving points again (`voxtile \
+                 clean`), or remove all marks (`voxtile clean --undo`)",
+                scan.number
+            );
+            Err(Error::argument(self.folder.display().to_string(), reason))
+        })
+    }
+
     /// The kept scans, in order.
     pub fn scans(&self) -> &[KeptScanHead] {
         &self.heads
@@ -134,10 +153,11 @@ impl KeptScanHead {
             KeptFrame::World(_) => None,
         };
         let KeptRecord { number, stamp_ns, points, updates, place, moving, .. } = *record;
-        let of_marks = moving.map_or(place.segment, |marks| marks.place.segment);
+        let of_marks = moving.and_then(|marks| marks.place).map_or(place.segment, |place| place.segment);
         let moving_points = moving.map_or(0, |marks| marks.marked);
         let segments = [place.segment, of_marks];
-        Self { number, stamp_ns, world_from_sensor, updates, points, moving_points, segments }
+        let has_lost_marks = record.has_lost_marks();
+        Self { number, stamp_ns, world_from_sensor, updates, points, moving_points, has_lost_marks, segments }
     }
 
     /// Creates a summary of a scan, for tests.
@@ -150,6 +170,7 @@ impl KeptScanHead {
             updates: 0,
             points: 0,
             moving_points: 0,
+            has_lost_marks: false,
             segments: [0; 2],
         }
     }

@@ -406,12 +406,13 @@ impl OutOfCoreTileMapper {
         Ok((report, tiles))
     }
 
-    /// Sets the ray settings from the next scan on.
+    /// Sets the ray settings from the next scan on, such as those of a kept scan. Region and rule of clearing must be
+    /// those of the map.
     ///
     /// # Errors
     ///
     /// Fails if the configuration is invalid.
-    pub(crate) fn set_rays(&mut self, rays: RayConfig) -> Result<()> {
+    pub fn set_rays(&mut self, rays: RayConfig) -> Result<()> {
         self.config = MapConfig { rays, ..self.config.clone() }.validated()?;
         Ok(())
     }

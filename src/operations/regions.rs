@@ -59,7 +59,7 @@ impl Regions {
         // The scans of the inputs may be the same, but the lists still differ if scans were removed from one of the
         // maps.
         match own_region(map).filter(|_| are_same) {
-            Some(region) if map.scans()? == *list => self.regions.push(region),
+            Some(region) if map.scans()? == *list && !has_marks(map)? => self.regions.push(region),
             _ => self.scans = None,
         }
         Ok(())
@@ -70,6 +70,20 @@ impl Regions {
         let region = united(&self.regions)?;
         Some(OneBuild { region: (!is_all_of_space(region, &self.grid)).then_some(region) })
     }
+}
+
+/// Returns whether moving points of a map were marked after the build.
+fn has_marks(map: &MapReader) -> Result<bool> {
+    if !map.keeps_scans() {
+        return Ok(false);
+    }
+    let mut scans = map.kept_scans()?;
+    while let Some(record) = scans.next_record()? {
+        if record.moving.is_some() {
+            return Ok(true);
+        }
+    }
+    Ok(false)
 }
 
 /// Returns the region of a map, if all its tiles are in it.

@@ -59,23 +59,28 @@ impl PointReader {
     }
 }
 
-/// Reads the marks of moving points of a kept scan, if it has any.
+/// Reads the marks of moving points of a kept scan. Returns `None` if it has none, or lost them.
 ///
 /// # Errors
 ///
 /// Damage or an I/O error.
 pub(crate) fn read_marks(disk: &dyn Disk, layout: &Layout, scan: &KeptRecord) -> Result<Option<MovingMarks>> {
     let Some(kept) = scan.moving else { return Ok(None) };
-    let mut blocks = SegmentReader::open(disk, layout, kept.place)?;
+    let Some(place) = kept.place else { return Ok(None) };
+    let mut blocks = SegmentReader::open(disk, layout, place)?;
     let mut runs = Vec::new();
-    while let Some(block) = blocks.next_block()? {
+    // A run has at most 10 bytes, and all but the first have a point. More cannot be valid.
+    let max_bytes = scan.points.saturating_add(1).saturating_mul(10);
+    while let Some(block) = blocks.next_block()?
+        && runs.len() as u64 <= max_bytes
+    {
         runs.extend_from_slice(block);
     }
     match MovingMarks::from_bytes(runs, scan.points).filter(|marks| marks.marked() == kept.marked) {
         Some(marks) => Ok(Some(marks)),
         None => {
             let reason = format!("the marks of moving points of scan {} are invalid", scan.number);
-            Err(blocks.damaged(kept.place.offset, &reason))
+            Err(blocks.damaged(place.offset, &reason))
         }
     }
 }

@@ -10,8 +10,9 @@ use testkit::faulty_disk::{Fault, FaultyDisk, Unsynced};
 use testkit::random_scans::{Random, random_scan};
 use voxtile::integrity::{Repair, repair};
 use voxtile::operations::{
-    NewPoses, Remap, ScanSelection, delete_snapshot, remap, remove_scans, revert, snapshot,
+    NewPoses, Remap, ScanSelection, delete_snapshot, mark_moving, remap, remove_scans, revert, snapshot,
 };
+use voxtile::scan::MovingMarks;
 use voxtile::store::{CommitLog, Layout, TileStore, read_log};
 use voxtile::{Digest, MapReader, Mapper, OutOfCoreTileMapper, Pose, Result, ScanRef};
 
@@ -84,6 +85,58 @@ fn repaired(disk: &FaultyDisk, what: &str) -> Repair {
     let repair = repair(at(disk), |_| (), |_, _| ()).unwrap_or_else(|error| panic!("{what}: {error:#}"));
     assert_eq!(damage_in(disk), BTreeSet::new(), "{what}");
     repair
+}
+
+/// The points of a scan survive damage to its marks. Until the marks are renewed, nothing that uses them is done.
+#[test]
+fn damaged_marks_cost_no_scan() {
+    let disk = FaultyDisk::new(Fault::None);
+    (1..=4).for_each(|number| insert(&disk, number).unwrap());
+    let unmarked = digest_of(&disk, None).unwrap();
+    let before = files_of_scans(&disk);
+    let points: Vec<u64> = scans(&disk).unwrap().scans().iter().map(|scan| scan.points).collect();
+    let third = move |number: u64| Ok(MovingMarks::new((0..points[number as usize - 1]).map(|k| k % 3 == 0)));
+    mark_moving(&scans(&disk).unwrap(), [2, 3], third, &replay(), |_, _| ()).unwrap();
+    let marked = digest_of(&disk, None).unwrap();
+    snapshot(at(&disk), &name("s")).unwrap();
+    // Marks are in a segment of their own.
+    let is_new = |path: &&PathBuf| !before.contains_key(*path) && !path.to_string_lossy().contains("catalog");
+    let files = files_of_scans(&disk);
+    let segment = files.keys().find(is_new).unwrap();
+    for (damage, bytes) in damages(&files, segment) {
+        let disk = disk.copy();
+        match bytes {
+            Some(bytes) => disk.put(segment, &bytes),
+            None => disk.take(segment),
+        }
+        assert!(damage_in(&disk).contains(segment), "{damage}");
+        let repair = repaired(&disk, &damage);
+        assert_eq!((repair.scans_lost, repair.snapshot_scans_lost), (0, 0), "{damage}");
+        let lost: Vec<u64> = {
+            let summary = scans(&disk).unwrap();
+            let lost = summary.scans().iter().filter(|scan| scan.has_lost_marks);
+            lost.map(|scan| scan.number).collect()
+        };
+        // Both the map and the snapshot need the marks.
+        assert!(!lost.is_empty() && repair.marks_lost == 2 * lost.len() as u64, "{damage}: {repair:?}");
+        assert_eq!(
+            (kept(&disk).unwrap(), digest_of(&disk, None).unwrap()),
+            (vec![1, 2, 3, 4], marked),
+            "{damage}"
+        );
+        let refused = moved(&disk).unwrap_err().to_string();
+        assert!(refused.contains(&format!("scan {} are lost", lost[0])), "{damage}: {refused}");
+        // New marks, or none, restore the map.
+        let points: Vec<u64> = scans(&disk).unwrap().scans().iter().map(|scan| scan.points).collect();
+        let none = move |number: u64| Ok(MovingMarks::none(points[number as usize - 1]));
+        mark_moving(&scans(&disk).unwrap(), [2, 3], none, &replay(), |_, _| ()).unwrap();
+        assert_eq!(
+            (digest_of(&disk, None).unwrap(), damage_in(&disk)),
+            (unmarked, BTreeSet::new()),
+            "{damage}"
+        );
+        moved(&disk).unwrap();
+    }
 }
 
 /// Returns damaged versions of a file.

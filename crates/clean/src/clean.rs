@@ -55,6 +55,8 @@ pub struct Cleaned {
 pub enum Phase {
     /// Earlier marks are removed.
     Undoing,
+    /// A temporary map of the scans is built in reverse order.
+    Mapping,
     /// The scans that hit each place are counted, if parked things are not to be marked.
     Counting,
     /// Scans are compared with the map.
@@ -87,7 +89,7 @@ pub fn clean(
     let (disk, folder) = map.into().into_parts();
     let at = || MapPath::on(disk.clone(), &folder);
     let scans = KeptSummary::read(at())?;
-    scans.check_keeps_all()?;
+    how.replay.check(&scans)?;
     let mut replay = how.replay.clone();
     if scans.scans().iter().any(|scan| scan.moving_points > 0) {
         if replay.is_dry_run {

@@ -16,9 +16,12 @@ mod clean;
 mod find_moving;
 mod marks_file;
 mod neighborhood;
+mod reversed;
+mod scan_hits;
 mod search;
 mod seen_through;
 mod stays;
+mod temporary_map;
 mod undo;
 
 pub use clean::{Clean, Cleaned, Phase, clean};

@@ -1,17 +1,18 @@
 use crate::clean::Phase;
 use crate::find_moving::MovingFinder;
 use crate::marks_file::MarksFile;
+use crate::reversed::reversed_map;
 use crate::stays::{StayCounter, Stays};
 use rayon::prelude::*;
 use voxtile::mapper::{KeptScan, KeptScans, KeptSummary};
 use voxtile::scan::Stop;
 use voxtile::{Aabb, MapPath, MapReader, MemoryLimit, Result};
 
-/// Number of points from which on no further scan is examined at the same time.
-const MAX_POINTS_AT_ONCE: u64 = 1 << 19;
+/// Memory in bytes if there is no limit in bytes.
+const DEFAULT_BYTES: usize = 256 << 20;
 
-/// Memory for tiles in bytes if there is no limit in bytes.
-const DEFAULT_CACHE_BYTES: usize = 128 << 20;
+/// Most bytes per point for the voxels of a scan: rows of voxels, and points and answers of queries.
+const BYTES_PER_POINT: usize = 160;
 
 /// Search for the moving points of all kept scans.
 #[derive(Clone, Debug)]
@@ -39,14 +40,19 @@ pub(crate) struct Found {
 impl Search {
     /// Searches a map without marks. `progress` receives the number of scans done and in total.
     pub(crate) fn run(&self, map: MapPath, progress: &mut impl FnMut(Phase, u64, u64)) -> Result<Found> {
-        let reader = MapReader::open(map, cache_bytes(self.memory))?;
+        let shares = MemoryShares::of(self.memory, self.parked_scans.is_some());
+        let reader = MapReader::open(map, shares.tiles_bytes)?;
         let scans = reader.kept_summary()?;
-        let stays = self.parked_scans.map(|min_scans| self.count(&reader, &scans, min_scans, progress));
+        let all = scans.scans().len() as u64;
+        let mapped = |done| progress(Phase::Mapping, done, all);
+        let reversed = reversed_map(&reader, shares.reversed_bytes, &self.stop, mapped)?;
+        let finder = MovingFinder::new(&reader, &reversed, shares.points_at_a_time(), &self.stop);
+        let stays =
+            self.parked_scans.map(|min_scans| self.count(&reader, &finder, &shares, min_scans, progress));
         let stays = stays.transpose()?;
-        let finder = MovingFinder::new(&reader, self.region, stays.as_ref());
+        let finder = finder.with(self.region, stays.as_ref());
         let mut marks = MarksFile::in_folder(reader.folder())?;
         let (mut points, mut moving_points) = (0, 0);
-        let all = scans.scans().len() as u64;
         let (mut done, mut kept) = (0, reader.kept_scans()?);
         loop {
             self.stop.check()?;
@@ -71,36 +77,55 @@ impl Search {
     fn count(
         &self,
         map: &MapReader,
-        scans: &KeptSummary,
+        finder: &MovingFinder<'_>,
+        shares: &MemoryShares,
         min_scans: u32,
         progress: &mut impl FnMut(Phase, u64, u64),
     ) -> Result<Stays> {
-        let finder = MovingFinder::new(map, None, None);
-        let mut counter = StayCounter::beside(map, self.memory)?;
+        let all = map.kept_summary()?.scans().len() as u64;
+        let mut counter = StayCounter::begin(map, shares.counts_bytes)?;
         for (done, scan) in map.kept_scans()?.enumerate() {
             self.stop.check()?;
-            progress(Phase::Counting, done as u64, scans.scans().len() as u64);
+            progress(Phase::Counting, done as u64, all);
             finder.for_each_part(&scan?, |voxels| counter.add(&voxels))?;
         }
-        counter.finish(min_scans, self.memory)
+        Ok(counter.finish(min_scans))
     }
 }
 
-/// Returns the next scans, to be examined at the same time: at most one per thread, and of limited size.
+/// Returns the next scans, to be examined at the same time: at most one per thread.
 fn next_batch(kept: &mut KeptScans) -> Result<Vec<KeptScan>> {
-    let (mut batch, mut points) = (Vec::new(), 0);
-    while batch.len() < rayon::current_num_threads() && points < MAX_POINTS_AT_ONCE {
-        let Some(scan) = kept.next().transpose()? else { break };
-        points += scan.record().points;
-        batch.push(scan);
-    }
-    Ok(batch)
+    kept.take(rayon::current_num_threads()).collect()
 }
 
-/// Returns the memory for tiles in bytes. The rest of the limit is for the scans.
-pub(crate) fn cache_bytes(memory: MemoryLimit) -> usize {
-    match memory {
-        MemoryLimit::Bytes(bytes) => bytes / 2,
-        _ => DEFAULT_CACHE_BYTES,
+/// Shares of the memory limit.
+#[derive(Clone, Copy, Debug)]
+struct MemoryShares {
+    /// Tiles of the map.
+    tiles_bytes: usize,
+    /// Map of the scans in reverse order.
+    reversed_bytes: usize,
+    /// Counts of scans.
+    counts_bytes: usize,
+    /// Voxels of the scans that are examined at the same time.
+    scans_bytes: usize,
+}
+
+impl MemoryShares {
+    fn of(memory: MemoryLimit, has_counts: bool) -> Self {
+        let bytes = match memory {
+            MemoryLimit::Bytes(bytes) => bytes,
+            _ => DEFAULT_BYTES,
+        };
+        let counts_bytes = if has_counts { bytes / 8 } else { 0 };
+        let (reversed_bytes, scans_bytes) = (bytes / 2, bytes / 8);
+        let tiles_bytes = bytes - reversed_bytes - counts_bytes - scans_bytes;
+        Self { tiles_bytes, reversed_bytes, counts_bytes, scans_bytes }
+    }
+
+    /// Returns the number of points of a scan that are examined at the same time.
+    fn points_at_a_time(&self) -> u64 {
+        let scans = rayon::current_num_threads();
+        (self.scans_bytes / BYTES_PER_POINT / scans.max(1)).max(1) as u64
     }
 }

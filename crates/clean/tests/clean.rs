@@ -206,7 +206,18 @@ fn a_dry_run_and_a_stop_change_nothing() {
     assert_eq!(run(map, &Clean::default()).points_changed, planned.points_changed);
     let refused = clean(map, &dry, |_, _, _| ()).unwrap_err();
     assert!(refused.to_string().contains("undo them first"), "{refused}");
-    snapshot(map, &"after".parse().unwrap()).unwrap();
+    let after: SnapshotName = "after".parse().unwrap();
+    snapshot(map, &after).unwrap();
+
+    // What a replay would refuse is refused before the search.
+    undo(map, &Replay::default(), |_, _, _| ()).unwrap();
+    let small = Replay::default().with_memory(MemoryLimit::Bytes(1 << 20));
+    for how in [Replay::default().with_keep_as(after), small] {
+        clean(map, &Clean::new(how), |phase, _, _| panic!("{phase:?}")).unwrap_err();
+    }
+    let _writer = OutOfCoreTileMapper::open(map, Corridor::config()).unwrap();
+    let locked = clean(map, &dry, |phase, _, _| panic!("{phase:?}")).unwrap_err();
+    assert!(matches!(locked, Error::Locked { .. }), "{locked}");
 }
 
 #[test]

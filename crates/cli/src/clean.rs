@@ -45,6 +45,7 @@ pub fn run(args: &CleanArgs) -> anyhow::Result<ExitCode> {
         job.progress.set(done, all);
         job.progress.show_message(match phase {
             Phase::Undoing => "removing earlier marks",
+            Phase::Mapping => "mapping in reverse order",
             Phase::Counting => "counting hits",
             Phase::Finding => "finding what moved",
             Phase::Replaying => "replaying",

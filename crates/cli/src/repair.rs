@@ -59,6 +59,14 @@ pub fn run(args: &RepairArgs) -> anyhow::Result<ExitCode> {
                  some cannot be replayed"
             )?;
         }
+        if repair.marks_lost > 0 {
+            let scans = Counted(repair.marks_lost, "kept scan");
+            writeln!(
+                out,
+                "marks of moving points: those of {scans} are lost; mark them again with `voxtile clean`, or remove all \
+                 with `voxtile clean --undo`"
+            )?;
+        }
         if repair.inputs_forgotten > 0 {
             let inputs = HumanCount(repair.inputs_forgotten);
             writeln!(

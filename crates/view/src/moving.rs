@@ -87,7 +87,7 @@ impl Marks {
             let Some(moving) = record.moving else { continue };
             marks.points = marks.points.saturating_add(moving.marked);
             marks.points_to_read = marks.points_to_read.saturating_add(record.points);
-            let place = moving.place;
+            let Some(place) = moving.place else { continue };
             for number in [record.number, moving.marked, place.segment, place.offset, place.bytes] {
                 hash.update(&number.to_le_bytes());
             }

@@ -318,10 +318,8 @@ impl TileDisk {
             // The marks follow the points.
             let end = place.offset + place.bytes;
             let bytes = archive.end_scan().bytes - place.bytes;
-            moving = Some(KeptMarks {
-                marked: marks.marked(),
-                place: SegmentPlace { offset: end, bytes, ..place },
-            });
+            let place = Some(SegmentPlace { offset: end, bytes, ..place });
+            moving = Some(KeptMarks { marked: marks.marked(), place });
         }
         match kept {
             Ok(()) => Ok((place, moving)),
@@ -344,7 +342,7 @@ impl TileDisk {
         let archive = self.store.archive_mut();
         archive.begin_scan()?;
         match marks.as_bytes().chunks(MARKS_BLOCK_BYTES).try_for_each(|block| archive.push_block(block)) {
-            Ok(()) => Ok(Some(KeptMarks { marked: marks.marked(), place: archive.end_scan() })),
+            Ok(()) => Ok(Some(KeptMarks { marked: marks.marked(), place: Some(archive.end_scan()) })),
             Err(error) => {
                 archive.give_up_scan();
                 Err(error)

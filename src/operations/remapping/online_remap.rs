@@ -59,7 +59,7 @@ impl OnlineRemap {
         let threads =
             threads.map_err(|error| Error::io(folder, "start threads", std::io::Error::other(error)))?;
         let (remapped, changes) = Remapped::by_poses(scans, poses, how)?;
-        let mut revision = Revision::new(scans, &how.replay, changes);
+        let mut revision = Revision::new(scans, &how.replay, changes)?;
         let store = TileStore::open_read_only(disk.clone(), folder)?;
         check_catalog(&store, scans.catalog())?;
         let touched = threads.install(|| revision.look(&store))?;

@@ -45,6 +45,7 @@ pub fn rebuild(
     // Report invalid ray settings before anything is created.
     let scans = map.kept_summary_with(|record| rays(&record.rays).map(drop))?;
     scans.check_keeps_all()?;
+    scans.check_marks(|_| false)?;
     let count = scans.scans().len() as u64;
     drop(scans);
     let (disk, folder) = output.into().into_parts();

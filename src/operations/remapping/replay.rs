@@ -1,8 +1,9 @@
 use super::completion::{complete, remove_second_map};
 use super::revision::{Changes, Revision};
-use crate::config::MemoryLimit;
+use crate::config::{MapConfig, MemoryLimit};
 use crate::error::{Error, Result};
 use crate::mapper::KeptSummary;
+use crate::persistence::config_from;
 use crate::scan::Stop;
 use crate::store::{Disk, SnapshotName, TileStore};
 use serde::Serialize;
@@ -44,6 +45,32 @@ impl Replay {
     pub fn with_stop(self, stop: Stop) -> Self {
         Self { stop, ..self }
     }
+
+    /// Checks what a replay needs, whatever the changes. Call this before a long search for changes.
+    ///
+    /// # Errors
+    ///
+    /// A map that keeps no scans or has other scans too; too little memory; another writer; [`Error::Changed`] if one
+    /// has flushed since `scans` was read; an existing snapshot `keep_as`; damage; an I/O error.
+    pub fn check(&self, scans: &KeptSummary) -> Result<()> {
+        scans.check_keeps_all()?;
+        let mut store = open(scans)?;
+        self.config_of(&store)?;
+        if let (Some(name), false) = (&self.keep_as, self.is_dry_run) {
+            store.snapshot_writer().check_name(name)?;
+        }
+        Ok(())
+    }
+
+    /// Returns the configuration of a map, with the memory limit of the replay.
+    ///
+    /// # Errors
+    ///
+    /// Damage, or too little memory.
+    pub(super) fn config_of(&self, store: &TileStore) -> Result<MapConfig> {
+        let config = config_from(store.metadata(), &store.layout().metadata())?;
+        MapConfig { memory: self.memory, ..config }.validated()
+    }
 }
 
 /// Counts of a replay, or of its dry run.
@@ -77,11 +104,8 @@ pub(super) fn replay(
     mut progress: impl FnMut(u64, u64),
 ) -> Result<Replayed> {
     let (disk, folder) = scans.place();
-    let mut store = TileStore::open(disk.clone(), folder)?;
-    if store.commits().flush_number != scans.flush_number() {
-        return Err(Error::Changed { path: folder.to_owned() });
-    }
-    let mut revision = Revision::new(scans, how, changes);
+    let mut store = open(scans)?;
+    let mut revision = Revision::new(scans, how, changes)?;
     let takes_points = revision.takes_points();
     if takes_points {
         // Checked before the search for affected tiles, which can take long.
@@ -103,6 +127,16 @@ pub(super) fn replay(
     }
     second?;
     Ok(counts)
+}
+
+/// Opens the map for writing, as of the flush of the summary.
+fn open(scans: &KeptSummary) -> Result<TileStore> {
+    let (disk, folder) = scans.place();
+    let store = TileStore::open(disk, folder)?;
+    match store.commits().flush_number == scans.flush_number() {
+        true => Ok(store),
+        false => Err(Error::Changed { path: folder.to_owned() }),
+    }
 }
 
 /// Creates the snapshot `keep_as` of the current map, if requested. An existing one of this state is reused.

@@ -4,7 +4,6 @@ use super::replay::{Replay, Replayed};
 use crate::config::{GUARD_REACH, MapConfig};
 use crate::error::{Error, Result};
 use crate::mapper::{KeptScan, KeptSummary, Remapper, TileFinder};
-use crate::persistence::config_from;
 use crate::scan::{ChunkMarks, MovingMarks, Pose, ScanPoints, ScanReport};
 use crate::space::{Aabb, Grid, TileBox, TileIndex, TileSelection};
 use crate::store::{CatalogEntry, Disk, KeptRecord, Layout, TileStore};
@@ -95,8 +94,13 @@ impl Touched {
 }
 
 impl Revision {
-    pub(super) fn new(scans: &KeptSummary, how: &Replay, changes: Changes) -> Self {
+    /// # Errors
+    ///
+    /// A scan whose marks of moving points are lost, unless the changes remove or mark it.
+    pub(super) fn new(scans: &KeptSummary, how: &Replay, changes: Changes) -> Result<Self> {
         let (mut counts, mut segments, mut changed_updates) = (Replayed::default(), BTreeSet::new(), 0_u64);
+        let is_renewed = |scan| matches!(changes.get(&scan), Some(Change::Remove | Change::Mark(_)));
+        scans.check_marks(is_renewed)?;
         for scan in scans.scans() {
             counts.scans += 1;
             counts.updates = counts.updates.saturating_add(scan.updates);
@@ -111,7 +115,7 @@ impl Revision {
                 }
             }
         }
-        Self { disk: scans.place().0, how: how.clone(), changes, segments, changed_updates, counts }
+        Ok(Self { disk: scans.place().0, how: how.clone(), changes, segments, changed_updates, counts })
     }
 
     pub(super) fn takes_points(&self) -> bool {
@@ -120,7 +124,7 @@ impl Revision {
 
     /// Finds the tiles that the change affects.
     pub(super) fn look(&mut self, store: &TileStore) -> Result<Touched> {
-        let config = self.config_of(store)?;
+        let config = self.how.config_of(store)?;
         self.counts.tiles = store.tiles().count() as u64;
         let (began, mut looked_at) = (Instant::now(), 0);
         let are_all = self.changed_updates > self.counts.updates / PART_FOR_ALL;
@@ -165,7 +169,12 @@ impl Revision {
                     let lost = FilteredScan::new(&scan, *region, true)?;
                     finder.tiles_of(&lost, &rays, store.folder())?
                 }
-                Change::Mark(marks) => tiles_of_marks(&config.grid, &scan, &marks.of(&scan)?)?,
+                Change::Mark(marks) => {
+                    tiles.extend(scan.record().tiles.iter().filter(|_| scan.record().has_lost_marks()));
+                    tiles.extend(tiles_of_marks(&config.grid, &scan, &marks.of(&scan)?)?);
+                    // No ray is traced.
+                    continue;
+                }
                 Change::Remove => Vec::new(),
             });
             *looked_at += updates;
@@ -175,9 +184,11 @@ impl Revision {
         if changes_hits && config.rays.clearing().guard().is_some() {
             // With guarded clearing, a hit makes nearby misses weak, also in tiles that its ray did not pass.
             let reach = config.grid.tiles_within(GUARD_REACH);
-            let near = |tile| TileBox::new(tile, tile).grown(reach).tiles();
-            let exist: Vec<_> = tiles.iter().flat_map(|&tile| near(tile)).collect();
-            tiles.extend(exist.into_iter().filter(|tile| store.tiles().contains(*tile)));
+            let changed: Vec<_> = tiles.iter().copied().collect();
+            for tile in changed {
+                let near = TileBox::new(tile, tile).grown(reach).tiles();
+                tiles.extend(near.filter(|tile| store.tiles().contains(*tile)));
+            }
         }
         Ok(tiles)
     }
@@ -202,11 +213,6 @@ impl Revision {
         let rate = if looked_at > 0 { looked_at as f64 / took_s.max(1e-6) } else { 20e6 };
         self.counts.estimated_s = Some(1.5 * updates / rate);
         Ok(())
-    }
-
-    fn config_of(&self, store: &TileStore) -> Result<MapConfig> {
-        let config = config_from(store.metadata(), &store.layout().metadata())?;
-        MapConfig { memory: self.how.memory, ..config }.validated()
     }
 
     fn open(&self, layout: &Layout, record: KeptRecord) -> Result<KeptScan> {
@@ -284,8 +290,7 @@ impl Revision {
 
     /// Copies the points and marks of a scan out of segments that are going to be removed.
     fn copy_out(&self, remapper: &mut Remapper, record: &mut KeptRecord) -> Result<()> {
-        let places = [Some(&mut record.place), record.moving.as_mut().map(|marks| &mut marks.place)];
-        for place in places.into_iter().flatten() {
+        for place in record.places_mut() {
             if self.segments.contains(&place.segment) {
                 *place = remapper.copy(*place)?;
             }
@@ -374,14 +379,15 @@ impl Revision {
 }
 
 /// Returns the tiles of the points whose marks differ from those of the scan, in no order. They include all tiles in
-/// which the scan gains or loses hits.
+/// which the scan gains or loses hits. If the marks of the scan are lost, these are the tiles of all points.
 fn tiles_of_marks(grid: &Grid, scan: &KeptScan, new: &MovingMarks) -> Result<Vec<TileIndex>> {
     let (mut old, mut new) = (ChunkMarks::from(scan.moving(), 0), ChunkMarks::from(Some(new), 0));
     let mut tiles = FxHashSet::default();
+    let are_lost = scan.record().has_lost_marks();
     scan.for_each_chunk(0..scan.len(), &mut |points, _| {
         let (old, new) = (old.next(points.len()), new.next(points.len()));
         let is_set = |marks: &[bool], number: usize| marks.get(number).is_some_and(|is_set| *is_set);
-        let differs = |number: &usize| is_set(old, *number) != is_set(new, *number);
+        let differs = |number: &usize| are_lost || is_set(old, *number) != is_set(new, *number);
         tiles.extend((0..points.len()).filter(differs).filter_map(|number| grid.tile_of(points[number])));
         true
     })?;

@@ -71,6 +71,11 @@ impl<W> StagedMap<W> {
         &self.folder
     }
 
+    /// Writer of the map, for reading.
+    pub fn get(&self) -> &W {
+        self.writer.as_ref().expect("only `finish` takes the writer, and it consumes the map")
+    }
+
     /// Writer of the map.
     pub fn writer(&mut self) -> &mut W {
         self.writer.as_mut().expect("only `finish` takes the writer, and it consumes the map")

@@ -27,8 +27,8 @@ pub enum KeptFrame {
 pub struct KeptMarks {
     /// Number of marked points, at least 1.
     pub marked: u64,
-    /// Location of the marks.
-    pub place: SegmentPlace,
+    /// Location of the marks; `None` if `repair` found them damaged, so that it is unknown which points are marked.
+    pub place: Option<SegmentPlace>,
 }
 
 /// Record of a kept scan.
@@ -90,9 +90,19 @@ impl KeptRecord {
         }
     }
 
+    /// Returns whether the scan has marks of moving points that are lost to damage.
+    pub fn has_lost_marks(&self) -> bool {
+        self.moving.is_some_and(|marks| marks.place.is_none())
+    }
+
+    /// Returns the mutable locations of the points and of the marks.
+    pub(crate) fn places_mut(&mut self) -> impl Iterator<Item = &mut SegmentPlace> {
+        std::iter::once(&mut self.place).chain(self.moving.as_mut().and_then(|marks| marks.place.as_mut()))
+    }
+
     /// Returns the locations of all that is kept of the scan: its points, and its marks if there are any.
     pub fn places(&self) -> impl Iterator<Item = SegmentPlace> + use<> {
-        std::iter::once(self.place).chain(self.moving.map(|marks| marks.place))
+        std::iter::once(self.place).chain(self.moving.and_then(|marks| marks.place))
     }
 }
 
@@ -174,7 +184,9 @@ fn write_kept(scan: &KeptRecord, out: &mut Vec<u8>) {
     }
     let SegmentPlace { segment, offset, bytes } = scan.place;
     [scan.points, scan.updates, segment, offset, bytes].iter().for_each(|n| out.extend(n.to_le_bytes()));
-    if let Some(KeptMarks { marked, place: SegmentPlace { segment, offset, bytes } }) = scan.moving {
+    if let Some(KeptMarks { marked, place }) = scan.moving {
+        // Marks have at least one byte, so an empty place means that they are lost.
+        let SegmentPlace { segment, offset, bytes } = place.unwrap_or_default();
         [marked, segment, offset, bytes].iter().for_each(|n| out.extend(n.to_le_bytes()));
     }
     let rays = serde_json::to_string(&scan.rays).unwrap_or_default();
@@ -202,7 +214,8 @@ fn read_kept(input: &mut Input<'_>) -> Option<KeptRecord> {
         0 => None,
         _ => {
             let [marked, segment, offset, bytes] = input.numbers()?;
-            Some(KeptMarks { marked, place: SegmentPlace { segment, offset, bytes } })
+            let place = (bytes > 0).then_some(SegmentPlace { segment, offset, bytes });
+            Some(KeptMarks { marked, place })
         }
     };
     let rays_bytes = input.packed_u64()?;
@@ -304,7 +317,10 @@ mod tests {
             has_intensities: true,
             updates: 99,
             place: SegmentPlace { segment: 3, offset: 1 << 40, bytes: 77 },
-            moving: Some(KeptMarks { marked: 5, place: SegmentPlace { segment: 4, offset: 9, bytes: 8 } }),
+            moving: Some(KeptMarks {
+                marked: 5,
+                place: Some(SegmentPlace { segment: 4, offset: 9, bytes: 8 }),
+            }),
             tiles: vec![TileIndex::new(-5, i32::MAX, 0), TileIndex::new(i32::MAX, i32::MIN, 2)],
         };
         let in_world = KeptRecord {

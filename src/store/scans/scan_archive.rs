@@ -543,8 +543,7 @@ impl ScanArchive {
         let mut moved = Ok(());
         for entry in &mut pending {
             let CatalogEntry::Kept(scan) = entry else { continue };
-            let places = [Some(&mut scan.place), scan.moving.as_mut().map(|marks| &mut marks.place)];
-            for place in places.into_iter().flatten() {
+            for place in scan.places_mut() {
                 if moved.is_ok() && self.failed_segments.contains(&place.segment) {
                     moved = self.copy(*place).map(|copy| *place = copy);
                 }

@@ -30,22 +30,13 @@ impl SnapshotWriter<'_> {
     pub fn create(&mut self, name: &SnapshotName) -> Result<()> {
         self.store.finish_earlier_work()?;
         let map_id = self.store.committer.logged_map_id()?;
-        let (folder, path) = (self.store.layout().snapshots(), self.store.layout().snapshot(name));
+        let folder = self.store.layout().snapshots();
         let has_folder = Snapshot::has_folder(&**self.store.disk(), self.store.layout())?;
-        let mut listed = self.store.committer.snapshots().cloned().unwrap_or_default();
-        if listed.contains(name) && self.is_kept_as(name) {
+        if !self.check_name(name)? {
             log::info!("{}: the snapshot {name} already has this state", self.store.folder().display());
             return Ok(());
         }
-        if listed.contains(name) || has_folder && self.store.files.kind(&path)?.is_some() {
-            let hint = "choose another name, or delete that snapshot first";
-            return Err(Error::AlreadyExists { path, hint });
-        }
-        if listed.len() >= MAX_SNAPSHOTS {
-            let (size, limit) = (listed.len() as u64 + 1, MAX_SNAPSHOTS as u64);
-            let hint = "delete snapshots first";
-            return Err(Error::TooLarge { what: "the number of snapshots", size, limit, hint });
-        }
+        let mut listed = self.store.committer.snapshots().cloned().unwrap_or_default();
         if !has_folder {
             self.store.disk().create_folder(&folder).map_err(|error| Error::io(&folder, "create", error))?;
         }
@@ -67,6 +58,30 @@ impl SnapshotWriter<'_> {
         self.store.checkpoint.name_snapshot(name);
         self.finish_commit();
         Ok(())
+    }
+
+    /// Checks that a snapshot of this name can be created. Returns false if there is one of the last commit.
+    ///
+    /// # Errors
+    ///
+    /// As for [`Self::create`]. Nothing is changed.
+    pub fn check_name(&self, name: &SnapshotName) -> Result<bool> {
+        let path = self.store.layout().snapshot(name);
+        let has_folder = Snapshot::has_folder(&**self.store.disk(), self.store.layout())?;
+        let listed = self.store.committer.snapshots().cloned().unwrap_or_default();
+        if listed.contains(name) && self.is_kept_as(name) {
+            return Ok(false);
+        }
+        if listed.contains(name) || has_folder && self.store.files.kind(&path)?.is_some() {
+            let hint = "choose another name, or delete that snapshot first";
+            return Err(Error::AlreadyExists { path, hint });
+        }
+        if listed.len() >= MAX_SNAPSHOTS {
+            let (size, limit) = (listed.len() as u64 + 1, MAX_SNAPSHOTS as u64);
+            let hint = "delete snapshots first";
+            return Err(Error::TooLarge { what: "the number of snapshots", size, limit, hint });
+        }
+        Ok(true)
     }
 
     /// Returns whether a snapshot of this name is readable and has the state of the last commit.
