@@ -42,13 +42,13 @@ folder_of() {
     echo "$work/$1"
 }
 
-# Builds $work/map of a set, given its folder, minimum and maximum range in metres, a resolution in metres and a rule.
-# Writes CPU seconds and MB to $work/usage.
+# Builds $work/map of a set, given its folder, minimum and maximum range in metres, a resolution in metres, a rule, and
+# perhaps more options. Writes CPU seconds and MB to $work/usage.
 build() {
     rm -rf "$work/map"
     RAYON_NUM_THREADS=1 "$python" tools/static_map/measured.py "$work/usage" "$voxtile" build "$1/scans" \
         --poses "$1/poses_kitti.txt" -o "$work/map" --resolution "$4" --min-range "$2" --max-range "$3" \
-        --storage compact --clearing "$5" --quiet
+        --storage compact --clearing "$5" --quiet "${@:6}"
 }
 
 # Adds a row to $work/rows.md, $work/distance.md and $work/usage.md. Arguments: name of a set, then those of `build`.
@@ -83,6 +83,21 @@ free_row() {
     echo "| \`$1\` | $cells |" >>"$work/free.md"
 }
 
+# Adds the row of a labelled set at a resolution in metres to $work/clean.md. Arguments: name of a set, its folder,
+# minimum and maximum range, resolution.
+clean_row() {
+    local flags cells cpu_s peak_mb
+    build "${@:2}" guarded --keep-scans
+    RAYON_NUM_THREADS=1 "$python" tools/static_map/measured.py "$work/usage" "$voxtile" clean "$work/map" --quiet
+    read -r cpu_s peak_mb <"$work/usage"
+    "$voxtile" export "$work/map" --scans "$work/flags" --quiet
+    flags=$("$python" tools/static_map/flags.py "$2" "$work/flags" "$3" "$4")
+    "$voxtile" export "$work/map" -o "$work/map.npz" --quiet
+    cells=$("$python" tools/static_map/score.py "$2" "$work/map.npz" "$5" "$3" "$4" | cut -d '|' -f 2-5)
+    rm -rf "$work/flags" "$work/map.npz"
+    echo "| \`$1\` | $5 | $flags |$cells| $cpu_s | $peak_mb |" >>"$work/clean.md"
+}
+
 # Returns whether DUFOMap runs on a set at a resolution.
 is_peer_set() { [[ $1 == kitti_0001_a || $1 == sim_spinning ]] && [[ $2 == 0.1 || $2 == 0.2 ]]; }
 
@@ -114,6 +129,9 @@ rows() {
         for rule in octomap guarded; do row "$name" "$folder" "$min_m" "$max_m" "$1" "$rule"; done
         if is_peer_set "$name" "$1" && "$python" -c 'import dufomap' 2>/dev/null; then
             dufomap_rows "$name" "$folder" "$min_m" "$max_m" "$1"
+        fi
+        if [[ $1 != 0.4 && ($name == kitti_0001_a || $name == sim_*) ]]; then
+            clean_row "$name" "$folder" "$min_m" "$max_m" "$1"
         fi
         if [[ $1 == 0.2 && ($name == kitti_0001_a || $name == sim_*) ]]; then
             free_row "$name" "$folder" "$min_m" "$max_m"
@@ -159,7 +177,7 @@ leave.
 
 *`kitti_0001_a` with voxels of 0.1 m, drawn by `tools/static_map/pictures.sh`: by OctoMap's rule, and with guarded
 clearing after `clean`. Red points are marked as moving. The two trails at the bottom are labelled as moving objects;
-most other marks, on the road and on parked cars, are errors.*
+other marks, on the road and on parked cars, are errors.*
 END
     table rows.md "\
 Points: share of all points within the range limit whose voxel the finished map calls occupied. With labels: static and
@@ -168,6 +186,12 @@ other), and points of parked cars that leave in occupied voxels (departed). CPU 
 thread." \
         "| set | voxel, m | rule | points | SA | DA | AA | DA, other | departed | CPU s |" \
         "|---|---:|---|---:|---:|---:|---:|---:|---:|---:|"
+    table clean.md "\
+\`voxtile clean\` of maps with guarded clearing. SA: static points that are not marked; DA: moving points that are marked;
+departed: points of parked cars that leave that are not marked. Then SA, DA, AA and DA (other) of the map afterwards, as
+above. CPU seconds and memory of \`clean\` with one thread." \
+        "| set | voxel, m | SA | DA | AA | departed | map: SA | DA | AA | DA, other | CPU s | peak, MB |" \
+        "|---|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|"
     table distance.md "By distance from the sensor:" \
         "| set | voxel, m | rule | SA, 0-10 | 10-20 | 20-35 | 35- | DA, 0-10 | 10-20 | 20-35 | 35- |" \
         "|---|---:|---|---:|---:|---:|---:|---:|---:|---:|---:|"

@@ -41,29 +41,39 @@ class Scans:
         self.range_m = min_range_m, max_range_m
 
     def __iter__(self):
+        for world, distance_m, labels, _ in self.with_selection():
+            yield world, distance_m, labels
+
+    def with_selection(self):
+        """Also yields which points of the file are within the range, shape (all points,)."""
         for path, pose in zip(self.files, self.poses):
             xyz, labels = points_of(path) if self.camera is None else (points_of_image(path, self.camera), None)
             distance_m = np.linalg.norm(xyz, axis=1)
             used = (distance_m > self.range_m[0]) & (distance_m < self.range_m[1])
             world = xyz[used] @ pose[:, :3].T + pose[:, 3]
-            yield world, distance_m[used], None if labels is None else labels[used]
+            yield world, distance_m[used], None if labels is None else labels[used], used
 
 
 def natural(path):
     return [int(part) if part.isdigit() else part for part in re.split(r"(\d+)", path.name)]
 
 
-def points_of(path):
-    """Returns points in the sensor's frame, shape (n, 3), and labels, shape (n,), or None."""
+def fields_of(path):
+    """Returns the points of a binary PCD file as records."""
     head, _, body = path.read_bytes().partition(b"DATA binary\n")
     lines = (line.split() for line in head.decode("latin1").splitlines() if line and not line.startswith("#"))
     entries = {line[0]: line[1:] for line in lines}
     kinds = {"F": "<f", "I": "<i", "U": "<u"}
     fields = zip(entries["FIELDS"], entries["TYPE"], entries["SIZE"], entries["COUNT"])
     record = np.dtype([(name, kinds[kind] + size, (int(count),)) for name, kind, size, count in fields])
-    points = np.frombuffer(body, record, int(entries["POINTS"][0]))
+    return np.frombuffer(body, record, int(entries["POINTS"][0]))
+
+
+def points_of(path):
+    """Returns points in the sensor's frame, shape (n, 3), and labels, shape (n,), or None."""
+    points = fields_of(path)
     xyz = np.stack([points[axis][:, 0] for axis in "xyz"], axis=1).astype(np.float64)
-    labels = points["label"][:, 0] if "label" in entries["FIELDS"] else None
+    labels = points["label"][:, 0] if "label" in points.dtype.names else None
     return xyz, labels
 
 

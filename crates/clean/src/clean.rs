@@ -68,8 +68,8 @@ pub enum Phase {
 /// Marks the points of kept scans that hit something that moved, so that they are no hits: their voxels become free
 /// where other rays passed them. The points and the misses of their rays stay.
 ///
-/// A voxel that a scan hits was seen through if the map calls it free: other scans, before or after, passed it often
-/// enough. A point is marked if at least three fifths of the voxels around its own that the same scan hits were seen
+/// A voxel that a scan hits was seen through if other scans, before or after, passed it often enough: the map calls it
+/// free, or a temporary map of the scans in reverse order. A point is marked if at least three fifths of the voxels around its own that the same scan hits were seen
 /// through, within 0.35 m along each axis, rounded to whole voxels. Things that stood still and left later are marked
 /// too if their place was seen through afterwards, except with `parked_scans`.
 ///

@@ -1,16 +1,18 @@
 //! Marks the points of a map's kept scans that hit something that moved, such as a car, a walker or a door.
 //!
 //! ```text
-//! kept scans, map -> voxels that a scan hits and the map calls free      seen_through
+//! kept scans      -> temporary map of them in reverse order                   reversed
+//! kept scans, maps -> voxels that a scan hits and a map calls free       seen_through
 //!                 -> of these, the ones that many scans hit: parked things     stays
 //!                 -> share of such voxels around each point -> marks     neighborhood, find_moving
 //!                 -> marks of all scans, in a temporary file             search, marks_file
 //!                 -> replay of the affected tiles, one commit            clean, undo
 //! ```
 //!
-//! A voxel that a scan hits and that the map calls free was seen through by other scans. A single one is often an error
-//! at the border of a surface. The hits on a moving body are seen through nearly everywhere, so each point is judged by
-//! the voxels around it that the same scan hits.
+//! A voxel that a scan hits and that a map calls free was seen through by other scans: by later ones if the map calls it
+//! free, by earlier ones if the reversed map does. A single one is often an error at the border of a surface. The hits on
+//! a moving body are seen through nearly everywhere, so each point is judged by the voxels around it that the same scan
+//! hits.
 
 mod clean;
 mod find_moving;
