@@ -1,9 +1,8 @@
 use crate::search::{Found, Search};
-use crate::undo::unmark;
 use serde::Serialize;
 use voxtile::mapper::KeptSummary;
 use voxtile::operations::{Replay, Replayed, mark_moving};
-use voxtile::{Aabb, Error, MapPath, Result};
+use voxtile::{Aabb, MapPath, Result};
 
 /// Options of [`clean`].
 #[derive(Clone, Debug, Default)]
@@ -45,7 +44,7 @@ pub struct Cleaned {
     pub replayed: Replayed,
     /// Number of points of all kept scans.
     pub points: u64,
-    /// Number of points that were marked as moving, or whose marks were removed by `undo`.
+    /// Number of points that are marked as moving, or whose marks were removed by `undo`.
     pub points_changed: u64,
 }
 
@@ -53,9 +52,9 @@ pub struct Cleaned {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Phase {
-    /// Earlier marks are removed.
+    /// Marks are removed by `undo`.
     Undoing,
-    /// A temporary map of the scans is built in reverse order.
+    /// Temporary maps of the scans are built.
     Mapping,
     /// The scans that hit each place are counted, if parked things are not to be marked.
     Counting,
@@ -73,14 +72,14 @@ pub enum Phase {
 /// through, within 0.35 m along each axis, rounded to whole voxels. Things that stood still and left later are marked
 /// too if their place was seen through afterwards, except with `parked_scans`.
 ///
-/// The result depends on the kept scans alone: earlier marks are removed first, in a commit of their own.
-/// `progress` receives the number of scans done and in total in each phase.
+/// The result depends on the kept scans alone, not on earlier marks. `progress` receives the number of scans done and in
+/// total in each phase.
 ///
 /// # Errors
 ///
-/// A map that keeps no scans or has other scans too; with `is_dry_run`, a map with marks; another writer, or
-/// [`Error::Changed`] if one has flushed meanwhile; damage; an I/O error; a request to stop. The map is unchanged then,
-/// or without its earlier marks.
+/// A map that keeps no scans or has other scans too; another writer, or [`Error::Changed`](voxtile::Error::Changed) if
+/// one has flushed meanwhile; damage; an I/O error; a request to stop. The map is unchanged then. A snapshot `keep_as`
+/// may have been created.
 pub fn clean(
     map: impl Into<MapPath>,
     how: &Clean,
@@ -90,26 +89,18 @@ pub fn clean(
     let at = || MapPath::on(disk.clone(), &folder);
     let scans = KeptSummary::read(at())?;
     how.replay.check(&scans)?;
-    let mut replay = how.replay.clone();
-    if scans.scans().iter().any(|scan| scan.moving_points > 0) {
-        if replay.is_dry_run {
-            let reason = "the map already has marks of moving points, and a dry run cannot remove them; undo them first";
-            return Err(Error::argument("dry_run", reason));
-        }
-        unmark(&scans, &replay, |done, all| progress(Phase::Undoing, done, all))?;
-        replay.keep_as = None;
-    }
     drop(scans);
 
     let search = Search {
         region: how.region,
         parked_scans: how.parked_scans,
-        memory: replay.memory,
-        stop: replay.stop.clone(),
+        memory: how.replay.memory,
+        stop: how.replay.stop.clone(),
     };
     let Found { scans, marks, points, moving_points } = search.run(at(), &mut progress)?;
     let (numbers, of_scan) = (marks.numbers(), move |number| marks.of_scan(number));
-    let replayed =
-        mark_moving(&scans, numbers, of_scan, &replay, |done, all| progress(Phase::Replaying, done, all))?;
+    let replayed = mark_moving(&scans, numbers, of_scan, &how.replay, |done, all| {
+        progress(Phase::Replaying, done, all)
+    })?;
     Ok(Cleaned { replayed, points, points_changed: moving_points })
 }

@@ -1,21 +1,21 @@
 use crate::neighborhood::{HitVoxels, MAX_RADIUS};
-use crate::reversed::ReversedMap;
 use crate::scan_hits::{HitReader, ScanHits};
-use crate::seen_through::find_seen_through;
+use crate::seen_through::{BothOrders, find_seen_through};
 use crate::stays::Stays;
+use std::path::Path;
 use voxtile::mapper::KeptScan;
 use voxtile::scan::{MovingMarks, Stop};
 use voxtile::space::Grid;
-use voxtile::{Aabb, MapReader, Queries, Result};
+use voxtile::{Aabb, Result};
 
 /// Distance of a neighbor in metres along each axis; rounded to whole voxels, at least one.
 const RADIUS_M: f64 = 0.35;
 
 /// Finder of the points of kept scans that hit something that moved.
-#[derive(Debug)]
 pub(crate) struct MovingFinder<'a> {
-    map: &'a MapReader,
-    reversed: &'a ReversedMap,
+    maps: BothOrders<'a>,
+    /// Folder for temporary files.
+    folder: &'a Path,
     grid: Grid,
     radius: i32,
     /// Number of points from which on a scan is examined in several parts, to bound the memory for its voxels.
@@ -27,15 +27,10 @@ pub(crate) struct MovingFinder<'a> {
 }
 
 impl<'a> MovingFinder<'a> {
-    pub(crate) fn new(
-        map: &'a MapReader,
-        reversed: &'a ReversedMap,
-        points_at_a_time: u64,
-        stop: &'a Stop,
-    ) -> Self {
-        let grid = map.grid();
+    pub(crate) fn new(maps: BothOrders<'a>, folder: &'a Path, points_at_a_time: u64, stop: &'a Stop) -> Self {
+        let grid = maps.forward.grid();
         let radius = (RADIUS_M / grid.resolution_m()).round().clamp(1.0, f64::from(MAX_RADIUS)) as i32;
-        Self { map, reversed, grid, radius, points_at_a_time, region: None, stays: None, stop }
+        Self { maps, folder, grid, radius, points_at_a_time, region: None, stays: None, stop }
     }
 
     /// Sets the box outside of which no point is marked, and the things that are not moving because they stayed.
@@ -94,13 +89,13 @@ impl<'a> MovingFinder<'a> {
 
     fn hits_of<'s>(&'s self, scan: &'s KeptScan, margin: i32) -> Result<ScanHits<'s>> {
         let reader = HitReader { scan, grid: self.grid, region: self.region, stop: self.stop };
-        ScanHits::of(reader, margin, self.points_at_a_time, self.map.folder())
+        ScanHits::of(reader, margin, self.points_at_a_time, self.folder)
     }
 
     fn hit_voxels(&self, hits: &mut ScanHits<'_>, part: usize) -> Result<HitVoxels> {
         let mut voxels = HitVoxels::default();
         hits.for_each(part, |hit| voxels.insert(hit.voxel))?;
-        find_seen_through(self.map, self.reversed, &mut voxels)?;
+        find_seen_through(self.maps, &mut voxels)?;
         Ok(voxels)
     }
 }

@@ -1,7 +1,7 @@
 //! Marks the points of a map's kept scans that hit something that moved, such as a car, a walker or a door.
 //!
 //! ```text
-//! kept scans      -> temporary map of them in reverse order                   reversed
+//! kept scans      -> temporary map of them in reverse order                   scan_map
 //! kept scans, maps -> voxels that a scan hits and a map calls free       seen_through
 //!                 -> of these, the ones that many scans hit: parked things     stays
 //!                 -> share of such voxels around each point -> marks     neighborhood, find_moving
@@ -18,8 +18,8 @@ mod clean;
 mod find_moving;
 mod marks_file;
 mod neighborhood;
-mod reversed;
 mod scan_hits;
+mod scan_map;
 mod search;
 mod seen_through;
 mod stays;

@@ -1,12 +1,13 @@
 use crate::clean::Phase;
 use crate::find_moving::MovingFinder;
 use crate::marks_file::MarksFile;
-use crate::reversed::reversed_map;
+use crate::scan_map::{Order, scan_map};
+use crate::seen_through::BothOrders;
 use crate::stays::{StayCounter, Stays};
 use rayon::prelude::*;
 use voxtile::mapper::{KeptScan, KeptScans, KeptSummary};
-use voxtile::scan::Stop;
-use voxtile::{Aabb, MapPath, MapReader, MemoryLimit, Result};
+use voxtile::scan::{ScanPoints, Stop};
+use voxtile::{Aabb, MapPath, MapReader, MemoryLimit, Queries, Result};
 
 /// Memory in bytes if there is no limit in bytes.
 const DEFAULT_BYTES: usize = 256 << 20;
@@ -29,7 +30,7 @@ pub(crate) struct Search {
 #[derive(Debug)]
 pub(crate) struct Found {
     pub(crate) scans: KeptSummary,
-    /// Marks of the scans that have moving points.
+    /// Marks of the scans whose marks change.
     pub(crate) marks: MarksFile,
     /// Number of points of all scans.
     pub(crate) points: u64,
@@ -38,15 +39,26 @@ pub(crate) struct Found {
 }
 
 impl Search {
-    /// Searches a map without marks. `progress` receives the number of scans done and in total.
+    /// Searches the scans of a map, whatever their marks. `progress` receives the number of scans done and in total.
     pub(crate) fn run(&self, map: MapPath, progress: &mut impl FnMut(Phase, u64, u64)) -> Result<Found> {
         let shares = MemoryShares::of(self.memory, self.parked_scans.is_some());
         let reader = MapReader::open(map, shares.tiles_bytes)?;
         let scans = reader.kept_summary()?;
         let all = scans.scans().len() as u64;
-        let mapped = |done| progress(Phase::Mapping, done, all);
-        let reversed = reversed_map(&reader, shares.reversed_bytes, &self.stop, mapped)?;
-        let finder = MovingFinder::new(&reader, &reversed, shares.points_at_a_time(), &self.stop);
+        // The map lacks hits whose points are marked.
+        let has_marks = scans.scans().iter().any(|scan| scan.moving_points > 0);
+        let maps = 1 + u64::from(has_marks);
+        let mut map_of = |order: Order, earlier| {
+            let mapped = |done| progress(Phase::Mapping, earlier * all + done, maps * all);
+            scan_map(&reader, order, shares.map_bytes, &self.stop, mapped)
+        };
+        let reverse = map_of(Order::Reverse, 0)?;
+        let forward = has_marks.then(|| map_of(Order::Forward, 1)).transpose()?;
+        let maps = BothOrders {
+            forward: forward.as_ref().map_or(&reader as &dyn Queries, |forward| forward.get()),
+            reverse: reverse.get(),
+        };
+        let finder = MovingFinder::new(maps, reader.folder(), shares.points_at_a_time(), &self.stop);
         let stays =
             self.parked_scans.map(|min_scans| self.count(&reader, &finder, &shares, min_scans, progress));
         let stays = stays.transpose()?;
@@ -64,7 +76,11 @@ impl Search {
             let of_batch: Result<Vec<_>> = batch.par_iter().map(|scan| finder.marks_of(scan)).collect();
             for (scan, of_scan) in batch.iter().zip(of_batch?) {
                 (points, moving_points) = (points + of_scan.points(), moving_points + of_scan.marked());
-                if of_scan.marked() > 0 {
+                let is_same = match scan.moving() {
+                    Some(before) => *before == of_scan,
+                    None => of_scan.marked() == 0 && !scan.record().has_lost_marks(),
+                };
+                if !is_same {
                     marks.push(scan.number(), &of_scan)?;
                 }
             }
@@ -103,8 +119,8 @@ fn next_batch(kept: &mut KeptScans) -> Result<Vec<KeptScan>> {
 struct MemoryShares {
     /// Tiles of the map.
     tiles_bytes: usize,
-    /// Map of the scans in reverse order.
-    reversed_bytes: usize,
+    /// Each temporary map of the scans.
+    map_bytes: usize,
     /// Counts of scans.
     counts_bytes: usize,
     /// Voxels of the scans that are examined at the same time.
@@ -118,9 +134,9 @@ impl MemoryShares {
             _ => DEFAULT_BYTES,
         };
         let counts_bytes = if has_counts { bytes / 8 } else { 0 };
-        let (reversed_bytes, scans_bytes) = (bytes / 2, bytes / 8);
-        let tiles_bytes = bytes - reversed_bytes - counts_bytes - scans_bytes;
-        Self { tiles_bytes, reversed_bytes, counts_bytes, scans_bytes }
+        let (map_bytes, scans_bytes) = (bytes / 4, bytes / 8);
+        let tiles_bytes = bytes / 2 - counts_bytes - scans_bytes;
+        Self { tiles_bytes, map_bytes, counts_bytes, scans_bytes }
     }
 
     /// Returns the number of points of a scan that are examined at the same time.

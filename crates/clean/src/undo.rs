@@ -16,10 +16,7 @@ pub fn undo(
     how: &Replay,
     mut progress: impl FnMut(Phase, u64, u64),
 ) -> Result<Cleaned> {
-    unmark(&KeptSummary::read(map)?, how, |done, all| progress(Phase::Undoing, done, all))
-}
-
-pub(crate) fn unmark(scans: &KeptSummary, how: &Replay, progress: impl FnMut(u64, u64)) -> Result<Cleaned> {
+    let scans = KeptSummary::read(map)?;
     let marked = scans.scans().iter().filter(|scan| scan.moving_points > 0);
     let counts: FxHashMap<u64, u64> = marked.clone().map(|scan| (scan.number, scan.points)).collect();
     let numbers: Vec<u64> = counts.keys().copied().collect();
@@ -29,6 +26,6 @@ pub(crate) fn unmark(scans: &KeptSummary, how: &Replay, progress: impl FnMut(u64
     };
     let points = scans.scans().iter().map(|scan| scan.points).sum();
     let points_changed = marked.map(|scan| scan.moving_points).sum();
-    let replayed = mark_moving(scans, numbers, none, how, progress)?;
+    let replayed = mark_moving(&scans, numbers, none, how, |done, all| progress(Phase::Undoing, done, all))?;
     Ok(Cleaned { replayed, points, points_changed })
 }

@@ -21,32 +21,20 @@ pub struct Job {
 
 impl Job {
     pub fn of(args: &ReplayArgs) -> anyhow::Result<Self> {
-        Ok(Self::with_stop(args, stop_signal::catch_undone()?))
-    }
-
-    pub fn with_stop(args: &ReplayArgs, stop: Stop) -> Self {
+        let stop = stop_signal::catch_undone()?;
         let replay = Replay::default()
             .with_memory(memory_of(args.memory))
             .with_keep_as(args.keep_as.clone())
             .with_dry_run(args.dry_run)
             .with_stop(stop.clone());
-        Self { replay, progress: Progress::over_scans(Some(0)), stop }
+        Ok(Self { replay, progress: Progress::over_scans(Some(0)), stop })
     }
 
     /// Returns the exit code if a signal stopped the replay, after a message that the map has not changed.
     pub fn ended<T>(&self, outcome: voxtile::Result<T>) -> anyhow::Result<Result<T, ExitCode>> {
-        self.ended_with(outcome, "the map has not changed")
-    }
-
-    /// Same as `ended`, with the state of the map after a stop.
-    pub fn ended_with<T>(
-        &self,
-        outcome: voxtile::Result<T>,
-        state: &str,
-    ) -> anyhow::Result<Result<T, ExitCode>> {
         match outcome {
             Err(voxtile::Error::Stopped) if self.stop.is_set() => {
-                print_message(format_args!("stopped; {state}"));
+                print_message(format_args!("stopped; the map has not changed"));
                 Ok(Err(ExitCode::from(INTERRUPTED)))
             }
             outcome => Ok(Ok(outcome?)),

@@ -33,11 +33,6 @@ pub fn catch_undone() -> anyhow::Result<Stop> {
     catch_with_messages("stopping; the map does not change", "stopped at once; the map has not changed")
 }
 
-/// Same as `catch`, for `clean`, which may already have removed earlier marks.
-pub fn catch_unmarked() -> anyhow::Result<Stop> {
-    catch_with_messages("stopping; no point gets a mark", "stopped at once; no point has got a mark")
-}
-
 /// Same as `catch`, for output that is written next to its final path and renamed at the end.
 pub fn catch_unfinished() -> anyhow::Result<Stop> {
     catch_with_messages(
