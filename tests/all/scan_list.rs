@@ -2,12 +2,12 @@
 //! the map.
 
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use tempfile::TempDir;
 use voxtile::integrity::{repair, verify};
-use voxtile::operations::convert;
+use voxtile::operations::{convert, revert, snapshot};
 use voxtile::store::ScanRecord;
-use voxtile::{MapConfig, MapReader, Mapper, OutOfCoreTileMapper, Scan, ScanRef, Storage};
+use voxtile::{MapConfig, MapReader, Mapper, OutOfCoreTileMapper, Scan, ScanRef, SnapshotName, Storage};
 
 fn scan(k: u64) -> Scan {
     let x = k as f64;
@@ -63,6 +63,42 @@ fn a_map_lists_the_scans_of_its_last_flush() {
     let other = folder.path().join("other");
     convert(&MapReader::open(&map, 1 << 20).unwrap(), &other, Storage::Compact, |_, _| ()).unwrap();
     assert_eq!(scans_of(&other), expected(7));
+}
+
+#[test]
+fn a_flush_without_scans_does_not_commit_records_of_a_killed_writer() {
+    let folder = TempDir::new().unwrap();
+    let (map, killed) = (folder.path().join("map"), folder.path().join("killed"));
+    let [base, other] = ["base", "other"].map(|name| SnapshotName::new(name).unwrap());
+    let mut mapper = make_map(&map, 2);
+    mapper.snapshot(&base).unwrap();
+    insert(&mut mapper, 3..6);
+    mapper.flush().unwrap();
+    drop(mapper);
+    // A revert that was killed between its record in the list and its commit.
+    let reverted = copy_folder(&map, &killed);
+    revert(&*reverted, &base, None, |_, _| ()).unwrap();
+    fs::copy(killed.join("scans.bin"), map.join("scans.bin")).unwrap();
+    assert_eq!(scans_of(&map), expected(5));
+    // The snapshot is a flush with the same number.
+    snapshot(&*map, &other).unwrap();
+    let found = verify(&*map, |finding| panic!("{finding}"), |_, _| ()).unwrap();
+    assert_eq!(found.damage, 0);
+    assert_eq!(scans_of(&map), expected(5));
+}
+
+/// Copies a folder with its subfolders.
+fn copy_folder(from: &Path, to: &Path) -> PathBuf {
+    fs::create_dir(to).unwrap();
+    for entry in fs::read_dir(from).unwrap() {
+        let path = entry.unwrap().path();
+        let copy = to.join(path.file_name().unwrap());
+        match path.is_dir() {
+            true => drop(copy_folder(&path, &copy)),
+            false => drop(fs::copy(&path, &copy).unwrap()),
+        }
+    }
+    to.to_owned()
 }
 
 #[test]

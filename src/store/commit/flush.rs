@@ -79,6 +79,12 @@ impl TileStore {
         Ok(self.scans.quarantined().map(Path::to_owned))
     }
 
+    /// Removes uncommitted entries of the list of scans, before a commit without scans.
+    pub(in crate::store) fn remove_excess_scans(&mut self) -> Result<()> {
+        let (flush_number, records) = (self.versions.commits().flush_number, self.listed_records());
+        self.scans.remove_excess(&self.files, flush_number, records)
+    }
+
     /// Number of records in the list of scans as of the last commit, if known.
     pub(crate) fn listed_records(&self) -> Option<u64> {
         self.metadata().ext.as_ref().and_then(|ext| ext.scan_records)
@@ -322,6 +328,7 @@ impl TileStore {
     /// An I/O error, [`Error::LockLost`].
     pub fn forget(&mut self, tiles: &[TileIndex]) -> Result<()> {
         self.finish_earlier_work()?;
+        self.remove_excess_scans()?;
         self.versions.forget(tiles);
         if self.map_id().is_some() {
             self.committed_nothing(self.commits().flush_number + 1);

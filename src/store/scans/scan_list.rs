@@ -1,6 +1,6 @@
 use super::scan_record::{Entry, RECORD_BYTES, ScanRecord};
 use crate::error::{DecodeError, Error, FormatError, Result, is_of_medium};
-use crate::store::disk::Disk;
+use crate::store::disk::{Disk, EntryKind};
 use crate::store::layout::Layout;
 use crate::store::map_files::MapFiles;
 use crate::store::recovery::quarantine::Quarantine;
@@ -115,6 +115,28 @@ impl ScanList {
             files.sync_map_folder()?;
         }
         Ok(Extent { records: before.records + pending.len() as u64 })
+    }
+
+    /// Removes entries after the committed part before a commit without scans. They have the number of that flush, and
+    /// would count as committed by it. The arguments are those of [`ScanList::write`].
+    ///
+    /// # Errors
+    ///
+    /// An I/O error.
+    pub(in crate::store) fn remove_excess(
+        &mut self,
+        files: &MapFiles,
+        committed: u64,
+        records: Option<u64>,
+    ) -> Result<()> {
+        let file_bytes = match files.kind(&files.layout().scans())? {
+            Some(EntryKind::File(bytes)) => bytes,
+            _ => 0,
+        };
+        if records.is_some_and(|records| Extent { records }.bytes() == file_bytes) {
+            return Ok(());
+        }
+        self.write(files, committed, records, 0).map(drop)
     }
 
     /// Replaces the file by its readable leading part and moves the original to quarantine. Returns the extent of the

@@ -94,6 +94,7 @@ impl TileStore {
     /// in the log, so that recovery handles a crash like at any other flush.
     pub(in crate::store) fn commit_snapshots(&mut self, listed: SnapshotList) -> Result<()> {
         self.committer.check_lock()?;
+        self.remove_excess_scans()?;
         self.name_own_catalog();
         self.keep_for_late_readers();
         match self.committer.append_snapshots(&self.files, &self.versions, listed) {

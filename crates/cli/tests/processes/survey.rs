@@ -81,9 +81,13 @@ pub fn digest(map: &Path) -> Result<(usize, String), String> {
     Ok((scan_number, answer["digest"].as_str().unwrap().to_owned()))
 }
 
-/// Returns whether `voxtile verify` finds no damage.
+/// Returns whether `voxtile verify` finds no damage, and prints what it finds.
 pub fn is_whole(map: &Path) -> bool {
-    voxtile().arg("verify").arg(map).stdout(Stdio::null()).status().unwrap().success()
+    let output = voxtile().arg("verify").arg(map).output().unwrap();
+    if !output.status.success() {
+        println!("{}{}", String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));
+    }
+    output.status.success()
 }
 
 /// Returns a number from the environment, or the default of the short form.
