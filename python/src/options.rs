@@ -8,6 +8,7 @@ use std::path::{Path, PathBuf};
 use voxtile::space::Aabb;
 use voxtile::{Clearing, InsertMode, MemoryLimit, Storage};
 use voxtile_formats::ReadOptions;
+use voxtile_formats::write::FileUnit;
 use voxtile_pipeline::numbers::{Mount, point_of, region_of, set_mount, tolerance_ns};
 use voxtile_pipeline::{BuildOptions, ExportOptions, SensorModelKind, WhenBehind, WhichVoxels};
 
@@ -135,6 +136,8 @@ pub fn export_options(
     options.region = region(py, &mut keywords, "region")?;
     let origin = keywords.numbers("origin")?;
     options.origin_m = origin.map(|numbers| point_of("origin", &numbers)).transpose().map_err(raised)?;
+    options.crs = keywords.text("crs")?;
+    options.unit = keywords.one_of("unit", &FileUnit::ALL.map(|unit| (unit.name(), unit)))?;
     options.memory_bytes = keywords.bytes("memory")?.unwrap_or(options.memory_bytes);
     keywords.end()?;
     Ok(options)

@@ -247,6 +247,12 @@ def test_export_and_files_of_octomap(city: Path, tmp_path: Path) -> None:
     voxtile.import_octree(tmp_path / "city.ot", tmp_path / "imported", storage="compact")
     with voxtile.open(tmp_path / "imported") as imported, voxtile.open(city) as ours:
         assert len(imported.occupied()[0]) == len(ours.occupied()[0])
+    voxtile.export(city, tmp_path / "metres.xyz")
+    voxtile.export(city, tmp_path / "feet.xyz", unit="ft")
+    metres, feet = (np.loadtxt(tmp_path / name)[:, :3] for name in ("metres.xyz", "feet.xyz"))
+    assert np.allclose(metres, feet * 0.3048, atol=1e-3)
+    with pytest.raises(errors.ArgumentError, match="^unit: m, but the unit of EPSG:2230 is us-ft"):
+        voxtile.export(city, tmp_path / "city.laz", crs="EPSG:2230", unit="m")
     with pytest.raises(errors.ArgumentError, match="^output: .*its extension is unknown"):
         voxtile.export(city, tmp_path / "city.what")
 

@@ -10,6 +10,7 @@ use std::io::{self, IsTerminal, Write};
 use std::path::Path;
 use std::process::ExitCode;
 use voxtile::Error;
+use voxtile_formats::write::FileUnit;
 use voxtile_pipeline::output::is_standard_output;
 use voxtile_pipeline::{
     ExportOptions, ExportSummary, ExportedScans, POSES_NAME, WhichPoints, WhichVoxels, Written, export,
@@ -56,6 +57,8 @@ fn options_of(args: &ExportArgs) -> voxtile::Result<ExportOptions> {
     options.is_quantized = args.quantize;
     options.region = args.region.as_deref().map(region_of).transpose()?;
     options.origin_m = args.origin.as_deref().map(point_of);
+    options.crs.clone_from(&args.crs);
+    options.unit = args.unit.as_deref().and_then(FileUnit::of_name);
     options.memory_bytes = args.memory.map_or(options.memory_bytes, |bytes| bytes.as_u64() as usize);
     Ok(options)
 }

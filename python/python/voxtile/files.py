@@ -83,7 +83,7 @@ class BuildOptions(ReadOptions, total=False):
 
 
 class ExportOptions(TypedDict, total=False):
-    """Options of ``voxtile export``. Lengths are in metres.
+    """Options of ``voxtile export``. Lengths are in metres, whatever the ``unit`` of the file.
 
     ``format`` is needed if the extension of the output does not name it: ply pcd csv bt ot xyz npz las laz copc e57
     parquet mcap glb nav2 heightmap geotiff autoware 3dtiles.
@@ -98,6 +98,8 @@ class ExportOptions(TypedDict, total=False):
     quantize: bool
     region: _Corners | None
     origin: Sequence[float] | None
+    crs: str | None
+    unit: Literal["m", "ft", "us-ft"] | None
     memory: int | str
 
 

@@ -3,7 +3,7 @@ use bytesize::ByteSize;
 use clap::builder::{ArgPredicate, PossibleValue, PossibleValuesParser};
 use clap::{Args, ValueEnum};
 use std::path::PathBuf;
-use voxtile_formats::write::OutputFormats;
+use voxtile_formats::write::{FileUnit, OutputFormats};
 
 #[derive(Debug, Args)]
 #[command(allow_negative_numbers = true)]
@@ -58,6 +58,13 @@ pub struct ExportArgs {
     /// one if float32 is too coarse [default: 0 0 0]
     #[arg(long, value_names = ["X", "Y", "Z"], num_args = 3)]
     pub origin: Option<Vec<f64>>,
+    /// .las, .laz, .copc.laz, .e57, .parquet, .tif: coordinate system of the file, as EPSG:2230 or well-known text; if
+    /// it is in feet, so is the file [default: that of the map]
+    #[arg(long, value_name = "CRS")]
+    pub crs: Option<String>,
+    /// .las, .laz, .copc.laz, .xyz, .tif: unit of coordinates and heights [default: that of --crs, otherwise m]
+    #[arg(long, value_name = "UNIT", value_parser = unit_names())]
+    pub unit: Option<String>,
     /// Memory for assembling a .bt or .ot file, in addition to one tile, such as 64MiB or 1GiB [default: 64MiB]
     #[arg(long, value_name = "SIZE")]
     pub memory: Option<ByteSize>,
@@ -69,6 +76,11 @@ pub struct ExportArgs {
 fn format_names() -> PossibleValuesParser {
     let formats = OutputFormats::default();
     formats.all().iter().map(|format| PossibleValue::new(format.name).help(format.help)).into()
+}
+
+/// Names of all units of files.
+fn unit_names() -> PossibleValuesParser {
+    FileUnit::ALL.map(FileUnit::name).into()
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]

@@ -38,6 +38,8 @@ mod cli_scan_stream;
 mod cli_several_inputs;
 /// Snapshots.
 mod cli_snapshots;
+/// Exports in feet and in other coordinate systems.
+mod cli_units;
 /// Recordings with damaged chunks.
 #[cfg(feature = "ros")]
 mod damaged_recordings;

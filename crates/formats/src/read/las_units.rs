@@ -1,7 +1,8 @@
-use super::crs_unit::{CrsUnit, FOOT_M, US_FOOT_M};
+use super::crs_unit::{CrsUnit, FOOT_M, US_FOOT_M, is_metric, of_state_plane};
 use super::las_layout::{Layout, double, number};
 use super::las_records::{DOUBLES_ID, KEYS_ID, WKT_ID};
 use super::wkt::WktUnits;
+use crate::crs_codes::epsg_code;
 
 /// Units and coordinate system of a LAS file.
 #[derive(Clone, Debug, PartialEq)]
@@ -14,9 +15,6 @@ pub(super) struct Units {
     pub(super) is_known: bool,
     pub(super) remarks: Vec<String>,
 }
-
-/// The coordinate system describes the original coordinates, not those converted to metres.
-const NOT_PASSED_ON: &str = "the coordinate system is not in metres and is not passed on";
 
 /// Returns a unit of length in metres, by its EPSG code.
 fn of_epsg(code: u64) -> Option<f64> {
@@ -87,8 +85,12 @@ impl Units {
             units
                 .remarks
                 .push(format!("coordinates are converted to metres: x and y times {flat}, z times {high}"));
-            if units.crs.take().is_some() {
-                units.remarks.push(NOT_PASSED_ON.into());
+            // It describes the original coordinates, not those converted to metres.
+            if let Some(crs) = units.crs.take() {
+                let code = epsg_code(&crs).map_or(String::new(), |code| format!(" (EPSG:{code})"));
+                units.remarks.push(format!(
+                    "the coordinate system{code} is not in metres and is not passed on; an export can name it with `crs`"
+                ));
             }
         }
         units
@@ -168,18 +170,4 @@ impl Units {
             "coordinates are degrees, not metres: project the file first (PDAL: filters.reprojection)".into(),
         );
     }
-}
-
-/// Returns the unit in metres of the NAD83 state planes in feet, which files often name without a unit.
-fn of_state_plane(code: u64) -> Option<f64> {
-    match code {
-        2222..=2224 | 2251..=2253 | 2256 | 2265 | 2266 | 2269 | 2270 | 2273 | 2280..=2282 => Some(FOOT_M),
-        2225..=2289 => Some(US_FOOT_M),
-        _ => None,
-    }
-}
-
-/// Returns whether a projected EPSG system is known to be metric, such as UTM on WGS 84, ETRS89 and NAD83.
-fn is_metric(code: u64) -> bool {
-    matches!(code, 32601..=32660 | 32701..=32760 | 25828..=25838 | 26901..=26923 | 3857 | 2154 | 2056 | 28992 | 27700)
 }

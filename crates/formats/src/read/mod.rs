@@ -8,8 +8,7 @@ mod bin_columns;
 pub(crate) mod cloud;
 mod columns;
 pub(crate) mod companions;
-#[cfg(any(feature = "las", feature = "e57"))]
-mod crs_unit;
+pub(crate) mod crs_unit;
 pub(crate) mod depth;
 mod depth_frames;
 pub(crate) mod depth_images;
@@ -79,7 +78,6 @@ mod text_columns;
 mod text_header;
 pub(crate) mod text_line;
 pub(crate) mod units;
-#[cfg(any(feature = "las", feature = "e57"))]
 mod wkt;
 #[cfg(feature = "e57")]
 mod xml_check;

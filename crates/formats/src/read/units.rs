@@ -101,6 +101,12 @@ impl LengthUnit {
     pub(crate) const fn metres(self, number: f64) -> f64 {
         number * self.times / self.per
     }
+
+    /// Converts metres to this unit. Metres are unchanged to the last bit.
+    #[inline]
+    pub(crate) const fn of_metres(self, length_m: f64) -> f64 {
+        length_m * self.per / self.times
+    }
 }
 
 impl TimeUnit {

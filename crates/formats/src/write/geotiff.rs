@@ -6,7 +6,7 @@ use super::out_file::OutFile;
 use super::row::{VoxelRow, VoxelSink, VoxelsHead};
 use super::sorted_columns::{Column, SortedColumns};
 use super::tiff_file::{TiffFile, Values};
-use super::{Error, Result};
+use super::{Error, FileUnit, Result};
 use crate::crs_codes::{CrsCodes, FlatCode};
 use flate2::Compression;
 use flate2::write::ZlibEncoder;
@@ -20,11 +20,11 @@ const TILE_EDGE: usize = 256;
 /// Maximum number of tiles of the image: the file stores the place of each.
 const MAX_TILES: u64 = 1 << 22;
 
-/// Names of the bands.
+/// Names of the bands, without their unit.
 const BANDS: [&str; 3] = [
-    "top of the highest occupied voxel, m",
-    "bottom of the lowest occupied voxel, m",
-    "mean height of the centers of the occupied voxels, m",
+    "top of the highest occupied voxel",
+    "bottom of the lowest occupied voxel",
+    "mean height of the centers of the occupied voxels",
 ];
 
 /// Writer of the heights of occupied voxels as a GeoTIFF of three bands.
@@ -180,7 +180,7 @@ impl GeoTiffSink {
     ) -> Vec<(u16, Values<'a>)> {
         let resolution_m = self.head.resolution_m;
         let [x, y, _] = raster.lattice.corner_m([raster.first_x, raster.first_y + 1, 0]);
-        let (keys, text) = geo_keys(self.options.crs.as_deref());
+        let (keys, text) = geo_keys(self.options.crs.as_deref(), self.options.unit);
         let mut fields = vec![
             (256, Values::Longs(vec![raster.size[0]])),
             (257, Values::Longs(vec![raster.size[1]])),
@@ -211,8 +211,9 @@ impl GeoTiffSink {
         if !text.is_empty() {
             fields.push((34737, Values::Text(text)));
         }
+        let unit = self.options.unit.name();
         let describe = |(band, name): (usize, &&str)| {
-            format!("<Item name=\"DESCRIPTION\" sample=\"{band}\" role=\"description\">{name}</Item>")
+            format!("<Item name=\"DESCRIPTION\" sample=\"{band}\" role=\"description\">{name}, {unit}</Item>")
         };
         let items: String = BANDS.iter().enumerate().map(describe).collect();
         fields.push((42112, Values::Text(format!("<GDALMetadata>{items}</GDALMetadata>"))));
@@ -235,8 +236,7 @@ fn needs_wkt(crs: &str) -> bool {
 }
 
 /// Returns the GeoTIFF keys of a coordinate system, and their text.
-fn geo_keys(crs: Option<&str>) -> (Vec<u16>, String) {
-    const METRE: u16 = 9001;
+fn geo_keys(crs: Option<&str>, unit: FileUnit) -> (Vec<u16>, String) {
     const USER_DEFINED: u16 = 32767;
     let Some(crs) = crs else { return (Vec::new(), String::new()) };
     // Cells are areas, not points.
@@ -244,7 +244,7 @@ fn geo_keys(crs: Option<&str>) -> (Vec<u16>, String) {
     let CrsCodes { flat, vertical } = CrsCodes::of(crs);
     match flat {
         Some(FlatCode::Projected(code)) => {
-            keys.extend([[1024, 0, 1, 1], [3072, 0, 1, code], [3076, 0, 1, METRE]]);
+            keys.extend([[1024, 0, 1, 1], [3072, 0, 1, code], [3076, 0, 1, unit.epsg()]]);
         }
         Some(FlatCode::Geographic(code)) => keys.extend([[1024, 0, 1, 2], [2048, 0, 1, code]]),
         Some(FlatCode::Geocentric(code)) => keys.extend([[1024, 0, 1, 3], [2048, 0, 1, code]]),
@@ -256,7 +256,10 @@ fn geo_keys(crs: Option<&str>) -> (Vec<u16>, String) {
         }
     }
     if let Some(code) = vertical {
-        keys.extend([[4096, 0, 1, code], [4099, 0, 1, METRE]]);
+        keys.push([4096, 0, 1, code]);
+    }
+    if vertical.is_some() || unit != FileUnit::Metre {
+        keys.push([4099, 0, 1, unit.epsg()]);
     }
     keys.sort_unstable();
     let head = [1, 1, 0, keys.len() as u16];
@@ -343,7 +346,7 @@ mod tests {
 
     #[test]
     fn coordinate_systems_are_stored_by_their_codes() {
-        let keys = |crs: &str| geo_keys(Some(crs)).0;
+        let keys = |crs: &str| geo_keys(Some(crs), FileUnit::Metre).0;
         assert_eq!(
             keys("EPSG:25832"),
             [1, 1, 0, 4, 1024, 0, 1, 1, 1025, 0, 1, 1, 3072, 0, 1, 25832, 3076, 0, 1, 9001]
@@ -351,6 +354,8 @@ mod tests {
         let both =
             r#"COMPD_CS["x",PROJCS["a",AUTHORITY["EPSG","25832"]],VERT_CS["b",AUTHORITY["EPSG","7837"]]]"#;
         assert_eq!(keys(both)[16..], [3076, 0, 1, 9001, 4096, 0, 1, 7837, 4099, 0, 1, 9001]);
+        let in_feet = geo_keys(Some("EPSG:2229"), FileUnit::UsSurveyFoot).0;
+        assert_eq!(in_feet[12..], [3072, 0, 1, 2229, 3076, 0, 1, 9003, 4099, 0, 1, 9003]);
         // A system without a code is text, in a file that GDAL reads too.
         let folder = tempfile::tempdir().unwrap();
         let mut options = WriteOptions::for_path(&folder.path().join("dem.tif"));

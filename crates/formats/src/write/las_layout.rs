@@ -1,7 +1,7 @@
 use super::options::WriteOptions;
 use super::out_file::OutFile;
 use super::row::{VoxelRow, VoxelsHead};
-use super::{Error, Result};
+use super::{Error, FileUnit, Result};
 use ::las::raw::header::{Evlr, LargeFile};
 use ::las::raw::vlr::RecordLength;
 use ::las::raw::{Header, Vlr};
@@ -146,14 +146,14 @@ pub(super) fn common_vlrs(options: &WriteOptions) -> Result<Vec<Vlr>> {
     fields.extend(extra_field("count", 6, "number of updates"));
     let mut vlrs = vec![vlr("LASF_Spec", 4, "fields of voxels", fields)?];
     if let Some(crs) = &options.crs {
-        vlrs.push(crs_vlr(crs)?);
+        vlrs.push(crs_vlr(crs, options.unit)?);
     }
     Ok(vlrs)
 }
 
 /// Returns the coordinate system record. LAS 1.4 requires well-known text with this point format. An EPSG code cannot
 /// be converted to it here, so it is stored as GeoTIFF keys, as in older versions.
-fn crs_vlr(crs: &str) -> Result<Vlr> {
+fn crs_vlr(crs: &str, unit: FileUnit) -> Result<Vlr> {
     let Some(number) = crs.strip_prefix("EPSG:") else {
         let text = [crs.as_bytes(), &[0]].concat();
         return vlr("LASF_Projection", 2112, "coordinate system", text);
@@ -164,8 +164,14 @@ fn crs_vlr(crs: &str) -> Result<Vlr> {
             format!("`{crs}` is not the EPSG code of a projected system: use well-known text"),
         )
     })?;
-    // Key directory version 1.1.0 with three keys: projected model, EPSG code, unit metre.
-    let keys = [[1, 1, 0, 3], [1024, 0, 1, 1], [3072, 0, 1, number], [3076, 0, 1, 9001]];
+    // Key directory version 1.1.0: projected model, EPSG code, its unit, and that of heights unless it is the metre.
+    let epsg = unit.epsg();
+    let keys = [[1, 1, 0, 4], [1024, 0, 1, 1], [3072, 0, 1, number], [3076, 0, 1, epsg], [4099, 0, 1, epsg]];
+    let mut keys = keys.to_vec();
+    if unit == FileUnit::Metre {
+        keys.pop();
+        keys[0][3] -= 1;
+    }
     let data = keys.as_flattened().iter().flat_map(|value| value.to_le_bytes()).collect();
     vlr("LASF_Projection", 34735, "coordinate system", data)
 }

@@ -18,6 +18,7 @@ mod counted;
 mod csv;
 #[cfg(feature = "e57")]
 mod e57;
+mod file_unit;
 mod flat_map;
 mod geotiff;
 mod glb;
@@ -57,6 +58,7 @@ mod tiff_file;
 mod xyz;
 mod zip_store;
 
+pub use file_unit::FileUnit;
 pub use options::WriteOptions;
 pub use output_format::{OpenFiles, OpenStream, Origin, OutputFormat, OutputOption, Writer};
 pub use pcd::PCD_REACH_VOXELS;

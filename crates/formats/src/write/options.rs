@@ -1,4 +1,4 @@
-use super::{Error, Result};
+use super::{Error, FileUnit, Result};
 use std::path::{Path, PathBuf};
 
 /// Settings for writing voxels.
@@ -10,9 +10,11 @@ pub struct WriteOptions {
     pub companion_folder: PathBuf,
     /// Folder for unnamed temporary files. They need about as much space as the output.
     pub scratch_folder: PathBuf,
-    /// Coordinate reference system of the coordinates, in metres: well-known text, or `EPSG:25832` if only the code is
-    /// known. Ignored by formats that cannot store it.
+    /// Coordinate reference system of the coordinates: well-known text, or `EPSG:25832` if only the code is known.
+    /// Ignored by formats that cannot store it.
     pub crs: Option<String>,
+    /// Unit of the voxels and of the head, for formats that take [`OutputOption::Unit`](super::OutputOption::Unit).
+    pub unit: FileUnit,
     /// 2D grids and heightmaps: only voxels that reach above this height, in metres.
     pub z_min_m: Option<f64>,
     /// 2D grids and heightmaps: only voxels that reach below this height, in metres.
@@ -44,6 +46,7 @@ impl WriteOptions {
             companion_folder: folder.clone(),
             scratch_folder: folder,
             crs: None,
+            unit: FileUnit::Metre,
             z_min_m: None,
             z_max_m: None,
             cell_m: 20.0,

@@ -47,6 +47,10 @@ pub enum OutputOption {
     Cell,
     /// 16-bit positions.
     Quantized,
+    /// A coordinate reference system.
+    Crs,
+    /// Another unit than metres.
+    Unit,
 }
 
 /// Supported origins of a file's coordinates.

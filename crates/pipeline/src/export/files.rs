@@ -15,20 +15,28 @@ pub(super) fn export(export: &Export<'_>) -> anyhow::Result<ExportSummary> {
     let (head, files_beside) = read_any_map(&options.map, |map| {
         let map = &Stoppable::new(map, watch.stop());
         let chosen = Chosen::of(export, map.config().occupied_log_odds());
+        let unit = options.file_unit()?;
         let head = head_of(&chosen, map)?;
         let staged = StagedOutput::beside(&options.output)?;
         let mut how = WriteOptions::for_path(&options.output);
-        how.crs.clone_from(&map.config().crs);
+        how.crs = options.file_crs(map.config().crs.as_ref())?;
+        how.unit = unit;
         how.companion_folder = staged.folder().to_owned();
-        (how.z_min_m, how.z_max_m) = (options.z_min_m, options.z_max_m);
+        let in_file = |length_m: f64| unit.of_metres(length_m);
+        (how.z_min_m, how.z_max_m) = (options.z_min_m.map(in_file), options.z_max_m.map(in_file));
         how.is_quantized = options.is_quantized;
         how.cell_m = options.cell_m.unwrap_or(how.cell_m);
         how.origin_m = options.origin_m.unwrap_or_default();
-        let mut sink = export.format.open(&head, &staged.path()?, &how)?;
+        let head_in_file = VoxelsHead {
+            resolution_m: in_file(head.resolution_m),
+            bounds_m: head.bounds_m.map(|corner| corner.map(in_file)),
+            ..head.clone()
+        };
+        let mut sink = export.format.open(&head_in_file, &staged.path()?, &how)?;
         let (grid, origin_m) = (map.config().grid, how.origin_m);
         let center_m = |voxel| {
             let center_m = grid.center_m(voxel);
-            std::array::from_fn(|k| center_m[k] - origin_m[k])
+            std::array::from_fn(|k| in_file(center_m[k] - origin_m[k]))
         };
         let gauge = watch.over_tiles(map.tile_indices().len());
         chosen.for_each(map, &*gauge, center_m, |row| sink.put(row))?;

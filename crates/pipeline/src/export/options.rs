@@ -2,7 +2,7 @@ use crate::output::is_standard_output;
 use std::path::PathBuf;
 use voxtile::space::{Aabb, Point};
 use voxtile::{Error, Result};
-use voxtile_formats::write::{Origin, OutputFormat, OutputFormats, OutputOption};
+use voxtile_formats::write::{FileUnit, Origin, OutputFormat, OutputFormats, OutputOption};
 
 /// Settings of an export. `None` means the default named here.
 #[derive(Clone, Debug)]
@@ -30,6 +30,11 @@ pub struct ExportOptions {
     /// Origin of the file's coordinates in the map, in metres, rounded to the nearest voxel corner except for Autoware.
     /// Default: the map's origin.
     pub origin_m: Option<Point>,
+    /// Coordinate reference system of the file: well-known text, or `EPSG:2230` if only the code is known. Default:
+    /// that of the map.
+    pub crs: Option<String>,
+    /// Unit of the file. Default: that of `crs`, otherwise metres.
+    pub unit: Option<FileUnit>,
     /// Memory in bytes for the part of an octree file being built, in addition to one tile.
     pub memory_bytes: usize,
 }
@@ -62,6 +67,8 @@ impl ExportOptions {
             is_quantized: false,
             region: None,
             origin_m: None,
+            crs: None,
+            unit: None,
             memory_bytes: 64 << 20,
         }
     }
@@ -87,6 +94,45 @@ impl ExportOptions {
         self.check_taken(&format)?;
         format.check_built()?;
         Ok(format)
+    }
+
+    /// Returns the unit of the file.
+    ///
+    /// # Errors
+    ///
+    /// The coordinate reference system has another unit, or one that files cannot have.
+    pub(super) fn file_unit(&self) -> Result<FileUnit> {
+        let Some(crs) = &self.crs else { return Ok(self.unit.unwrap_or_default()) };
+        match (FileUnit::of_crs(crs)?, self.unit) {
+            (Some(own), Some(unit)) if own != unit => {
+                let (unit, own) = (unit.name(), own.name());
+                Err(Error::argument(
+                    "unit",
+                    format!("{unit}, but the unit of {crs:.80} is {own}; omit one of the two"),
+                ))
+            }
+            (own, unit) => Ok(unit.or(own).unwrap_or_default()),
+        }
+    }
+
+    /// Returns the coordinate reference system of the file.
+    ///
+    /// # Errors
+    ///
+    /// The file has another unit than the system of the map.
+    pub(super) fn file_crs(&self, of_map: Option<&String>) -> Result<Option<String>> {
+        let unit = self.file_unit()?;
+        match (&self.crs, of_map) {
+            (None, Some(of_map)) if unit != FileUnit::Metre => {
+                let reason = format!(
+                    "{}, but the coordinate system of the map is in metres ({of_map:.80}); name that of the file with \
+                     `crs`",
+                    unit.name()
+                );
+                Err(Error::argument("unit", reason))
+            }
+            (own, of_map) => Ok(own.as_ref().or(of_map).cloned()),
+        }
     }
 
     fn known_format(&self) -> Result<OutputFormat> {
@@ -120,12 +166,15 @@ impl ExportOptions {
             Some(WhichVoxels::AtLeast(_)) => "min_probability",
             _ => "what",
         };
+        let unit = if self.unit.is_some() { "unit" } else { "crs" };
         let given = [
             (OutputOption::Region, self.region.is_some(), "region"),
             (OutputOption::Which, self.which.is_some(), which),
             (OutputOption::Heights, has_heights, "z_min, z_max"),
             (OutputOption::Cell, self.cell_m.is_some(), "cell"),
             (OutputOption::Quantized, self.is_quantized, "quantize"),
+            (OutputOption::Crs, self.crs.is_some(), "crs"),
+            (OutputOption::Unit, self.file_unit()? != FileUnit::Metre, unit),
         ];
         let (name, refusal) = (format.name, format.refusal);
         for (option, _, argument) in given.into_iter().filter(|&(_, is_given, _)| is_given) {
