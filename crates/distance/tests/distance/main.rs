@@ -1,0 +1,6 @@
+//! Distance fields compared with a brute force, in memory, live and in folders.
+
+mod fields;
+mod live;
+mod naive;
+mod random_map;
