@@ -109,7 +109,7 @@ impl Bits {
 }
 
 /// Returns a bit of a row.
-#[inline]
+#[cfg(test)]
 pub(crate) fn bit(row: &[u64], x: usize) -> bool {
     row[x / 64] >> (x % 64) & 1 == 1
 }

@@ -10,6 +10,7 @@
 //!     -> solve                                    signs, unknown voxels, distances beyond the cap
 //!     -> DistanceField                            a box in memory: points, gradients, paths
 //! map after each scan -> LiveDistances             the field of a box around the robot: live, live_observed
+//! map -> compute_field -> FieldReader              a field in a folder, larger than memory: folder/
 //! ```
 //!
 //! [`MapDistances`] adds fields to every map of tiles; [`DistanceField::of_set`] is for local maps.
@@ -20,6 +21,7 @@ mod clearance;
 mod distance;
 mod extent;
 mod field;
+mod folder;
 mod interpolation;
 mod line;
 mod live;
@@ -37,6 +39,7 @@ pub use cap::MAX_CAP_VOXELS;
 pub use clearance::{Blocked, Clearance};
 pub use distance::{Distance, DistanceAndGradient};
 pub use field::{DistanceField, MapDistances};
+pub use folder::{FieldOptions, FieldReader, FieldReport, compute_field};
 pub use live::{DistanceReader, DistanceUpdate, LiveDistances};
 pub use options::{DistanceOptions, UnknownRule};
 pub use voxel_distance::VoxelDistance;

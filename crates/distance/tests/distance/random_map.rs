@@ -35,9 +35,10 @@ pub fn random_options(random: &mut Random) -> DistanceOptions {
     DistanceOptions::new(cap_m).with_unknown(rules[random.below(3) as usize]).with_sign(random.below(2) == 0)
 }
 
-/// A box of a few metres around the map.
+/// A box of up to a few metres around the map, wider than a voxel.
 pub fn random_region(random: &mut Random) -> Aabb {
-    Aabb::from_corners(random.point([0.0; 3], 4.0), random.point([0.0; 3], 4.0))
+    let region = Aabb::from_corners(random.point([0.0; 3], 4.0), random.point([0.0; 3], 4.0));
+    Aabb { max: region.max.map(|k| k + 0.2), ..region }
 }
 
 pub fn voxels_of(voxels: &VoxelBox) -> impl Iterator<Item = VoxelIndex> {
