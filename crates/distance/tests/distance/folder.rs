@@ -10,7 +10,7 @@ use testkit::support::{cases, message_of};
 use voxtile::mapper::{MapReader, MapView, OutOfCoreTileMapper};
 use voxtile::scan::Stop;
 use voxtile::space::VoxelBox;
-use voxtile::{Error, Grid, MapOptions, Mapper, Scan, TileIndex};
+use voxtile::{Aabb, Error, MapOptions, Mapper, Scan, TileIndex};
 use voxtile_distance::{
     DistanceOptions, FieldOptions, FieldReader, FieldReport, MapDistances, UnknownRule, VoxelDistance,
     compute_field,
@@ -51,15 +51,19 @@ fn around(map: &impl MapView) -> VoxelBox {
 
 #[test]
 fn fields_of_random_maps_equal_the_brute_force_and_do_not_depend_on_memory_or_earlier_fields() {
-    for case in 0..cases(24, 500) {
+    for case in 0..cases(12, 500) {
         let random = &mut Random(case);
         let folder = memory_folder();
         let path = |name: &str| folder.path().join(name);
         let mut map = new_map(&path("map"), TILE_SIZES_M[case as usize % 3]);
         let distances = random_options(random);
-        let region = (random.below(3) == 0).then(|| random_region(random));
+        // Maps of the smallest tiles have thousands of them.
+        let region = match case % 3 {
+            0 => Some(Aabb { min: random.point([0.0; 3], 0.5), max: random.point([1.5; 3], 0.5) }),
+            _ => (random.below(3) == 0).then(|| random_region(random)),
+        };
         let options = FieldOptions::new(distances).with_region(region).with_map_id(Some("id".to_owned()));
-        for step in 0..3 {
+        for step in 0..2 {
             grow(&mut map, random, [0.3, -0.4, 0.2]);
             map.flush().unwrap();
             let reader = MapReader::open(path("map"), 1 << 20).unwrap();
@@ -271,28 +275,16 @@ fn random_bytes_as_a_tile_of_a_field_are_an_error() {
     }
 }
 
-/// The file of a tile in a map.
-fn file_of_tile(map: &Path, grid: &Grid, tile: TileIndex) -> PathBuf {
-    let _ = grid;
-    let name = format!("{}_{}_{}", tile.x, tile.y, tile.z);
-    let mut folders = vec![map.to_owned()];
-    while let Some(folder) = folders.pop() {
-        for entry in fs::read_dir(folder).unwrap() {
-            let path = entry.unwrap().path();
-            if path.is_dir() {
-                folders.push(path);
-            } else if path.to_str().unwrap().contains(&name)
-                && path.extension().is_some_and(|end| end == "vxt")
-            {
-                return path;
-            }
-        }
-    }
-    panic!("no file of tile {tile}");
+/// The file of a tile's table in a map.
+fn file_of_tile(map: &Path, tile: TileIndex) -> PathBuf {
+    let folder = map.join(format!("tile_{}_{}_{}", tile.x, tile.y, tile.z));
+    let names = ["tile.vxt", "iwlo_meta.bin"].map(|name| folder.join(name));
+    names.into_iter().find(|path| path.is_file()).unwrap()
 }
 
 #[test]
 fn surroundings_of_damaged_tiles_of_the_map_are_unknown() {
+    let mut wrong = 0;
     for case in 0..9 {
         let random = &mut Random(40 + case);
         let folder = memory_folder();
@@ -303,9 +295,11 @@ fn surroundings_of_damaged_tiles_of_the_map_are_unknown() {
         let distances = DistanceOptions::new(0.7).with_unknown(rule).with_sign(random.below(2) == 0);
         let options = FieldOptions::new(distances);
         let grid = reader.config().grid;
-        let damaged = grid.tile_of([0.5, 0.5, 0.5]).unwrap();
-        let mut naive = Naive::of(&reader, distances);
-        let file = file_of_tile(&map_path, &grid, damaged);
+        // Where unknown voxels are free, tiles without obstacles are not read.
+        let has_obstacles = |tile: &TileIndex| reader.version_of_tile(*tile).unwrap().occupied > 0;
+        let damaged = reader.tile_indices().into_iter().filter(has_obstacles).nth(3).unwrap();
+        let naive = Naive::of(&reader, distances);
+        let file = file_of_tile(&map_path, damaged);
         let whole = fs::read(&file).unwrap();
         fs::write(&file, &whole[..whole.len() / 2]).unwrap();
         let report = compute(&MapReader::open(&map_path, 1 << 20).unwrap(), &field_path, &options);
@@ -314,12 +308,10 @@ fn surroundings_of_damaged_tiles_of_the_map_are_unknown() {
         let field = open(&field_path);
         assert_eq!(field.damaged_map_tiles(), [damaged]);
         let tile = grid.voxels_of_tile(damaged);
-        let complete = naive.voxels.clone();
-        let mut wrong = 0;
-        for voxel in sample(random, &VoxelBox { min: [-10; 3], end: [20; 3] }, 300) {
+        let near = VoxelBox { min: tile.min.map(|k| k - 9), end: tile.end.map(|k| k + 9) };
+        for voxel in sample(random, &near, 200) {
             let found = field.voxel(voxel).unwrap();
             // The definition: unknown where the damaged tile could change the distance, else the same as without damage.
-            naive.voxels.clone_from(&complete);
             let truth = naive.distance(voxel);
             assert!(found == truth || found.is_unknown(), "{voxel:?}: {found:?}, {truth:?}");
             let to_tile: i32 =
@@ -332,7 +324,6 @@ fn surroundings_of_damaged_tiles_of_the_map_are_unknown() {
                 wrong += 1;
             }
         }
-        assert!(wrong > 10, "{wrong}");
         // Repaired, without a new version.
         fs::write(&file, &whole).unwrap();
         let report = compute(&MapReader::open(&map_path, 1 << 20).unwrap(), &field_path, &options);
@@ -341,6 +332,7 @@ fn surroundings_of_damaged_tiles_of_the_map_are_unknown() {
         compute(&MapReader::open(&map_path, 1 << 20).unwrap(), &fresh, &options);
         assert!(files(&field_path) == files(&fresh));
     }
+    assert!(wrong > 50, "{wrong}");
 }
 
 #[test]
