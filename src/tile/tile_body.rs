@@ -138,14 +138,26 @@ impl Tile {
             .map(|(code, evidence)| Voxel { index: self.index_of(code), evidence })
     }
 
-    /// Visits the bricks with observed voxels, in no particular order: the lowest voxel of the brick, which may be outside
-    /// of the tile, the mask of its observed voxels, and the mask of those whose log-odds are at least a threshold.
-    pub fn for_each_brick(&self, log_odds: f64, mut visit: impl FnMut(VoxelIndex, &BrickMask, &BrickMask)) {
-        for (brick, observed, from_threshold) in self.table.masks_from(log_odds) {
+    /// Visits the bricks with observed voxels that overlap a box, in no particular order: the lowest voxel of the brick,
+    /// which may be outside of the tile, the mask of its observed voxels, and the mask of those whose log-odds are at
+    /// least a threshold.
+    pub fn for_each_brick_in(
+        &self,
+        voxels: &VoxelBox,
+        log_odds: f64,
+        mut visit: impl FnMut(VoxelIndex, &BrickMask, &BrickMask),
+    ) {
+        for brick in self.table.brick_views() {
+            let observed = brick.observed();
             // The index of a voxel of the tile is unique, that of the brick's lowest voxel may be outside of it.
-            let Some(place) = places(*observed).next() else { continue };
-            let lowest = self.index_of(brick.voxel(place)).map(|k| k & !(BRICK_EDGE - 1));
-            visit(lowest, observed, &from_threshold);
+            let Some(place) = places(observed).next() else { continue };
+            let lowest = self.index_of(brick.code().voxel(place)).map(|k| k & !(BRICK_EDGE - 1));
+            let is_inside =
+                |k: usize| lowest[k] < voxels.end[k] && lowest[k].saturating_add(BRICK_EDGE) > voxels.min[k];
+            if (0..3).all(is_inside) {
+                let from = if brick.is_below(log_odds) { [0; 8] } else { brick.mask_from(log_odds) };
+                visit(lowest, &observed, &from);
+            }
         }
     }
 

@@ -1,6 +1,9 @@
 use crate::extent::Extent;
 use voxtile::VoxelIndex;
-use voxtile::space::BrickMask;
+use voxtile::space::{BrickMask, places};
+
+/// Number of voxels of a brick up to which they are changed one by one.
+const FEW_VOXELS: u32 = 24;
 
 /// A bit for each voxel of a box, in rows along x.
 #[derive(Clone, Debug)]
@@ -52,6 +55,9 @@ impl Bits {
         mut changed: impl FnMut(usize, usize),
     ) {
         let Extent { min, size } = self.extent;
+        if mask.iter().map(|word| word.count_ones()).sum::<u32>() <= FEW_VOXELS {
+            return self.toggle_few(lowest, mask, changed);
+        }
         let from: [i64; 3] = std::array::from_fn(|k| i64::from(lowest[k]) - min[k]);
         // Four octants along y and z, each with one or two words along x.
         for (quarter, [y4, z4]) in [[0, 0], [1, 0], [0, 1], [1, 1]].into_iter().enumerate() {
@@ -75,6 +81,19 @@ impl Bits {
                 if bits != 0 && is_inside && self.toggle_row(from[0], bits, y as usize, z as usize) {
                     changed(y as usize, z as usize);
                 }
+            }
+        }
+    }
+
+    /// As [`Bits::toggle_brick`], voxel by voxel.
+    fn toggle_few(&mut self, lowest: VoxelIndex, mask: &BrickMask, mut changed: impl FnMut(usize, usize)) {
+        for place in places(*mask) {
+            let along =
+                |k: usize| (place >> k & 1 | place >> (k + 3) << 1 & 2 | place >> (k + 6) << 2 & 4) as i32;
+            let voxel = std::array::from_fn(|k| lowest[k].saturating_add(along(k)));
+            if let Some([x, y, z]) = self.extent.place_of(voxel) {
+                self.words[(z * self.extent.size[1] + y) * self.words_per_row + x / 64] ^= 1 << (x % 64);
+                changed(y, z);
             }
         }
     }
@@ -143,7 +162,7 @@ mod tests {
                 let lowest = [0, 1, 2]
                     .map(|k| 8 * ((min[k] as i32 + random.below(size[k] as u64 + 16) as i32 - 8) / 8));
                 let mut mask = [0; 8];
-                for _ in 0..random.below(60) {
+                for _ in 0..random.below([20, 90][random.below(2) as usize]) {
                     let voxel = lowest.map(|k| k + random.below(8) as i32);
                     let before = mask;
                     add_to_mask(&mut mask, place_of_voxel(voxel));

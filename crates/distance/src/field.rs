@@ -139,6 +139,10 @@ impl DistanceField {
         Self { grid, options, extent, scale, chunks: extent.size[0].div_ceil(LANES), lines }
     }
 
+    pub(crate) fn into_lines(self) -> Vec<Line> {
+        self.lines
+    }
+
     /// Grid of the map.
     pub fn grid(&self) -> Grid {
         self.grid

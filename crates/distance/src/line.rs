@@ -16,50 +16,58 @@ pub(crate) const FAR_LINE: Line = [FAR; LANES];
 #[derive(Debug, Default)]
 pub(crate) struct Column {
     lines: Vec<Line>,
-    /// Whether a line has any distance within the cap.
-    is_live: Vec<bool>,
-    has_live: bool,
+    /// Number of lines before each one that have any distance within the cap; one more for all lines.
+    live_before: Vec<u32>,
 }
+
+/// Lines on each side that are compared together, so that the best values remain in registers.
+const GROUP: usize = 4;
 
 impl Column {
     /// Replaces the lines.
-    pub(crate) fn fill(&mut self, lines: impl Iterator<Item = Line>) {
+    pub(crate) fn fill<'a>(&mut self, lines: impl Iterator<Item = &'a Line>) {
         self.lines.clear();
-        self.lines.extend(lines);
-        self.is_live.clear();
-        self.is_live.extend(self.lines.iter().map(|line| min_of(line) != FAR));
-        self.has_live = self.is_live.contains(&true);
+        self.live_before.clear();
+        let mut live = 0;
+        for line in lines {
+            self.lines.push(*line);
+            self.live_before.push(live);
+            live += u32::from(min_of(line) != FAR);
+        }
+        self.live_before.push(live);
     }
 
     /// Returns whether any line has a distance within the cap.
     pub(crate) fn has_live(&self) -> bool {
-        self.has_live
+        self.live_before.last().is_some_and(|live| *live > 0)
+    }
+
+    /// Returns whether any line of a range has a distance within the cap.
+    #[inline]
+    fn has_live_in(&self, from: usize, end: usize) -> bool {
+        self.live_before[from] != self.live_before[end]
     }
 
     /// Returns the least sum of a line's values and the squared distance to that line, of all lines at most the cap
     /// away from the line `at`. There must be as many on both sides.
     pub(crate) fn least_around(&self, at: usize, cap: Cap) -> Line {
         let mut best = self.lines[at];
-        let (below, above) = (at - cap.reach..at, at + 1..at + 1 + cap.reach);
-        let below = self.lines[below.clone()].iter().zip(&self.is_live[below]).rev();
-        let above = self.lines[above.clone()].iter().zip(&self.is_live[above]);
-        for (number, ((low, is_low_live), (high, is_high_live))) in below.zip(above).enumerate() {
-            let steps = number as i16 + 1;
-            let square = steps * steps;
-            // No farther line can improve any lane. Checked now and then, because the check costs as much as a line.
-            if number % 4 == 0 && square >= max_of(&best) {
-                break;
+        if !self.has_live_in(at - cap.reach, at + cap.reach + 1) {
+            return FAR_LINE;
+        }
+        let mut most = max_of(&best);
+        let mut first = 1;
+        // No farther line can improve any lane once its square is as large as the largest value.
+        while first <= cap.reach && square(first) < most {
+            let last = (first + GROUP - 1).min(cap.reach);
+            if self.has_live_in(at - last, at - first + 1) || self.has_live_in(at + first, at + last + 1) {
+                // A group may end before its last line; that line then counts twice.
+                let steps: [usize; GROUP] = std::array::from_fn(|number| (first + number).min(last));
+                let low = steps.map(|steps| &self.lines[at - steps]);
+                let high = steps.map(|steps| &self.lines[at + steps]);
+                (best, most) = improved(&best, low, high, steps.map(square));
             }
-            match (is_low_live, is_high_live) {
-                (false, false) => {}
-                (true, false) => improve(&mut best, low, square),
-                (false, true) => improve(&mut best, high, square),
-                (true, true) => {
-                    for lane in 0..LANES {
-                        best[lane] = best[lane].min(low[lane].min(high[lane]).saturating_add(square));
-                    }
-                }
-            }
+            first = last + 1;
         }
         for lane in &mut best {
             *lane = if *lane > cap.squared { FAR } else { *lane };
@@ -69,10 +77,26 @@ impl Column {
 }
 
 #[inline]
-fn improve(best: &mut Line, other: &Line, square: i16) {
+fn square(steps: usize) -> i16 {
+    let steps = steps as i16;
+    steps * steps
+}
+
+/// Returns the least of the values and of a group's values plus squares, and the largest result.
+#[inline]
+fn improved(best: &Line, low: [&Line; GROUP], high: [&Line; GROUP], squares: [i16; GROUP]) -> (Line, i16) {
+    let mut out = FAR_LINE;
+    let mut most = i16::MIN;
     for lane in 0..LANES {
-        best[lane] = best[lane].min(other[lane].saturating_add(square));
+        let mut least = best[lane];
+        for number in 0..GROUP {
+            let nearer = low[number][lane].min(high[number][lane]);
+            least = least.min(nearer.saturating_add(squares[number]));
+        }
+        out[lane] = least;
+        most = most.max(least);
     }
+    (out, most)
 }
 
 #[inline]

@@ -1,6 +1,7 @@
 use crate::cap::Cap;
 use crate::extent::Extent;
 use crate::field::DistanceField;
+use crate::line::Line;
 use crate::live_observed::LiveObserved;
 use crate::options::DistanceOptions;
 use crate::solve::Solver;
@@ -36,6 +37,8 @@ pub struct LiveDistances {
     size_m: [f64; 3],
     options: DistanceOptions,
     state: Option<State>,
+    /// Memory of an earlier field, for the next one.
+    spare: Vec<Line>,
     reader: DistanceReader,
 }
 
@@ -51,10 +54,11 @@ impl DistanceReader {
         self.0.read().clone()
     }
 
-    fn set(&self, field: DistanceField) {
+    /// Replaces the field. Returns the memory of the earlier one, unless a reader still uses it.
+    fn set(&self, field: DistanceField) -> Vec<Line> {
         let before = self.0.write().replace(Arc::new(field));
-        // Dropped after the lock is released, because freeing the old field takes time.
-        drop(before);
+        // Freed after the lock is released, if at all.
+        before.and_then(Arc::into_inner).map(DistanceField::into_lines).unwrap_or_default()
     }
 }
 
@@ -93,7 +97,7 @@ impl LiveDistances {
             let reason = format!("{size_m:?} m; the edges of the box must be positive and finite");
             return Err(Error::argument("size", reason));
         }
-        Ok(Self { size_m, options, state: None, reader: DistanceReader::default() })
+        Ok(Self { size_m, options, state: None, spare: Vec::new(), reader: DistanceReader::default() })
     }
 
     /// Returns a handle for other threads.
@@ -153,8 +157,9 @@ impl LiveDistances {
         }
         state.is_new = false;
         state.live.forget_changes();
-        let lines = state.solver.distances(&state.live.observed);
-        self.reader.set(DistanceField::of_lines(grid, self.options, extent, lines));
+        let mut lines = std::mem::take(&mut self.spare);
+        state.solver.copy_distances(&state.live.observed, &mut lines);
+        self.spare = self.reader.set(DistanceField::of_lines(grid, self.options, extent, lines));
         Ok(update)
     }
 

@@ -75,14 +75,11 @@ impl LiveObserved {
             self.is_changed.fill(true);
         }
         let extent = self.observed.extent();
-        let within = extent.grown(8);
+        let voxels = extent.voxels();
         for index in tiles_in(map, &extent) {
             let Some(tile) = map.tile(index)? else { continue };
-            tile.for_each_brick(map.config().occupied_log_odds(), |lowest, known, occupied| {
-                // A brick may reach beyond the box, so its lowest voxel may be outside.
-                if within.place_of(lowest).is_some() {
-                    self.see(index, lowest, known, occupied);
-                }
+            tile.for_each_brick_in(&voxels, map.config().occupied_log_odds(), |lowest, known, occupied| {
+                self.see(index, lowest, known, occupied);
             });
         }
         self.forget_unseen();

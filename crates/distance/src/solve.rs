@@ -49,14 +49,14 @@ impl Solver {
         }
     }
 
-    /// The stored distances, by y, z and chunk.
-    pub(crate) fn distances(&self, observed: &Observed) -> Vec<Line> {
-        let mut lines = self.outside.lines().to_vec();
-        self.finish(observed, &mut lines);
-        lines
+    /// Replaces `lines` by the stored distances, by y, z and chunk.
+    pub(crate) fn copy_distances(&self, observed: &Observed, lines: &mut Vec<Line>) {
+        lines.clear();
+        lines.extend_from_slice(self.outside.lines());
+        self.finish(observed, lines);
     }
 
-    /// As [`Solver::distances`], without a copy.
+    /// The stored distances, by y, z and chunk.
     pub(crate) fn into_distances(mut self, observed: &Observed) -> Vec<Line> {
         let outside = std::mem::replace(
             &mut self.outside,

@@ -27,7 +27,7 @@ impl TileVoxels {
         let mut bricks: Vec<BrickVoxels> = Vec::new();
         if needs_known {
             if let Some(tile) = map.tile_uncached(tile)? {
-                tile.for_each_brick(threshold, |lowest, known, occupied| {
+                tile.for_each_brick_in(&tile.voxel_box(), threshold, |lowest, known, occupied| {
                     bricks.push(BrickVoxels { lowest, known: *known, occupied: *occupied });
                 });
             }

@@ -82,24 +82,25 @@ impl Transform {
     pub(crate) fn compute(&mut self, rows: &impl Rows) {
         let mut planes = std::mem::take(&mut self.planes);
         let [_, y_edge, z_edge] = self.extent.size;
+        let [all_y, all_z] = [y_edge, z_edge].map(|edge| vec![true; edge]);
         let plane_lines = (self.chunks * y_edge).max(1);
         planes.par_chunks_mut(plane_lines).enumerate().for_each_init(
             || self.new_plane(),
-            |buffers, (z, plane)| self.compute_plane(rows, z, buffers, |_| true, plane),
+            |buffers, (z, plane)| self.compute_plane(rows, z, buffers, &all_y, plane),
         );
         let mut lines = std::mem::take(&mut self.lines);
         let row_lines = (self.chunks * z_edge).max(1);
         lines.par_chunks_mut(row_lines).enumerate().for_each_init(Column::default, |column, (y, lines)| {
             for chunk in 0..self.chunks {
-                self.compute_column(&planes, y, chunk, column, |_| true, lines);
+                self.compute_column(&planes, y, chunk, column, &all_z, lines);
             }
         });
         (self.planes, self.lines) = (planes, lines);
     }
 
     /// Computes again what depends on changed rows: `is_changed` has a flag for each row of the surroundings, by z,
-    /// then y. Returns whether any distance may have changed.
-    pub(crate) fn update(&mut self, rows: &impl Rows, is_changed: &[bool]) -> bool {
+    /// then y.
+    pub(crate) fn update(&mut self, rows: &impl Rows, is_changed: &[bool]) {
         let [_, y_edge, z_edge] = self.extent.size;
         let reach = self.cap.reach;
         let (y_around, plane_lines) = (y_edge + 2 * reach, (self.chunks * y_edge).max(1));
@@ -108,15 +109,14 @@ impl Transform {
         let mut has_changed = vec![false; planes.len()];
         let per_plane = planes.par_chunks_mut(plane_lines).zip(has_changed.par_chunks_mut(plane_lines));
         per_plane.zip(is_changed.par_chunks(y_around.max(1))).enumerate().for_each_init(
-            || (self.new_plane(), Vec::new()),
-            |(buffers, before), (z, ((plane, has_changed), is_changed))| {
-                if !is_changed.contains(&true) {
+            || (self.new_plane(), Vec::new(), Vec::new()),
+            |(buffers, wanted, before), (z, ((plane, has_changed), is_changed))| {
+                if !within_reach(is_changed.iter().copied(), reach, wanted) {
                     return;
                 }
                 before.clear();
                 before.extend_from_slice(plane);
-                let is_wanted = |y: usize| is_changed[y..=y + 2 * reach].contains(&true);
-                self.compute_plane(rows, z, buffers, is_wanted, plane);
+                self.compute_plane(rows, z, buffers, wanted, plane);
                 for ((before, after), flag) in before.iter().zip(&*plane).zip(has_changed) {
                     *flag = before != after;
                 }
@@ -124,22 +124,18 @@ impl Transform {
         );
         let mut lines = std::mem::take(&mut self.lines);
         let row_lines = (self.chunks * z_edge).max(1);
-        let any =
-            lines.par_chunks_mut(row_lines).enumerate().map_init(Column::default, |column, (y, lines)| {
-                let mut any = false;
+        lines.par_chunks_mut(row_lines).enumerate().for_each_init(
+            || (Column::default(), Vec::new()),
+            |(column, wanted), (y, lines)| {
                 for chunk in 0..self.chunks {
-                    let flag = |z: usize| has_changed[(z * y_edge + y) * self.chunks + chunk];
-                    if !(0..z_edge + 2 * reach).any(flag) {
-                        continue;
+                    let flags = has_changed[y * self.chunks + chunk..].iter().step_by(plane_lines).copied();
+                    if within_reach(flags, reach, wanted) {
+                        self.compute_column(&planes, y, chunk, column, wanted, lines);
                     }
-                    any = true;
-                    self.compute_column(&planes, y, chunk, column, |z| (z..=z + 2 * reach).any(flag), lines);
                 }
-                any
-            });
-        let any = any.reduce(|| false, |a, b| a | b);
+            },
+        );
         (self.planes, self.lines) = (planes, lines);
-        any
     }
 
     /// Passes along x and y of one plane, for the wanted y.
@@ -148,11 +144,10 @@ impl Transform {
         rows: &impl Rows,
         z: usize,
         buffers: &mut Plane,
-        is_wanted: impl Fn(usize) -> bool,
+        wanted: &[bool],
         plane: &mut [Line],
     ) {
         let Plane { row, along_x, column } = buffers;
-        let y_edge = self.extent.size[1];
         let around = self.extent.grown(self.cap.reach);
         let mut has_bits = false;
         for y in 0..around.size[1] {
@@ -168,10 +163,10 @@ impl Transform {
         }
         for chunk in 0..self.chunks {
             if has_bits {
-                column.fill((0..around.size[1]).map(|y| along_x[y * self.chunks + chunk]));
+                column.fill((0..around.size[1]).map(|y| &along_x[y * self.chunks + chunk]));
             }
             let is_far = !has_bits || !column.has_live();
-            for y in (0..y_edge).filter(|&y| is_wanted(y)) {
+            for (y, _) in wanted.iter().enumerate().filter(|(_, is_wanted)| **is_wanted) {
                 let line = if is_far { FAR_LINE } else { column.least_around(y + self.cap.reach, self.cap) };
                 plane[y * self.chunks + chunk] = line;
             }
@@ -185,17 +180,16 @@ impl Transform {
         y: usize,
         chunk: usize,
         column: &mut Column,
-        is_wanted: impl Fn(usize) -> bool,
+        wanted: &[bool],
         lines: &mut [Line],
     ) {
-        let [_, y_edge, z_edge] = self.extent.size;
-        let around = z_edge + 2 * self.cap.reach;
-        column.fill((0..around).map(|z| planes[(z * y_edge + y) * self.chunks + chunk]));
-        for z in (0..z_edge).filter(|&z| is_wanted(z)) {
-            lines[z * self.chunks + chunk] = match column.has_live() {
-                true => column.least_around(z + self.cap.reach, self.cap),
-                false => FAR_LINE,
-            };
+        let y_edge = self.extent.size[1];
+        let around = wanted.len() + 2 * self.cap.reach;
+        column.fill((0..around).map(|z| &planes[(z * y_edge + y) * self.chunks + chunk]));
+        let is_far = !column.has_live();
+        for (z, _) in wanted.iter().enumerate().filter(|(_, is_wanted)| **is_wanted) {
+            let line = if is_far { FAR_LINE } else { column.least_around(z + self.cap.reach, self.cap) };
+            lines[z * self.chunks + chunk] = line;
         }
     }
 
@@ -206,5 +200,40 @@ impl Transform {
 
     pub(crate) fn into_lines(self) -> Vec<Line> {
         self.lines
+    }
+}
+
+/// Sets for each position whether any of the flags from it to `2 * reach` further is set. Returns whether any flag is.
+fn within_reach(flags: impl Iterator<Item = bool>, reach: usize, out: &mut Vec<bool>) -> bool {
+    out.clear();
+    let mut last = None;
+    for (position, flag) in flags.enumerate() {
+        if flag {
+            last = Some(position);
+        }
+        if let Some(first) = position.checked_sub(2 * reach) {
+            out.push(last.is_some_and(|last| last >= first));
+        }
+    }
+    last.is_some()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use testkit::random_scans::Random;
+
+    #[test]
+    fn positions_within_reach_of_a_flag_are_found() {
+        let mut random = Random(2);
+        for _ in 0..200 {
+            let (reach, edge) = (random.below(5) as usize, random.below(20) as usize);
+            let flags: Vec<bool> = (0..edge + 2 * reach).map(|_| random.below(6) == 0).collect();
+            let mut out = Vec::new();
+            assert_eq!(within_reach(flags.iter().copied(), reach, &mut out), flags.contains(&true));
+            let expected: Vec<bool> =
+                (0..edge).map(|position| flags[position..=position + 2 * reach].contains(&true)).collect();
+            assert_eq!(out, expected);
+        }
     }
 }

@@ -189,17 +189,9 @@ impl Table {
         })
     }
 
-    /// The bricks with observed voxels, in no particular order, each with the masks of its observed voxels and of those
-    /// whose log-odds are at least a threshold.
-    pub(crate) fn masks_from(
-        &self,
-        threshold: f64,
-    ) -> impl Iterator<Item = (BrickCode, &BrickMask, BrickMask)> {
-        self.bricks.iter().map(move |brick| {
-            let is_below = brick.is_below(threshold);
-            let from = if is_below { [0; 8] } else { brick.mask_from(threshold, &self.palette) };
-            (brick.code(), &brick.observed, from)
-        })
+    /// Views of the bricks with observed voxels, in no particular order.
+    pub(crate) fn brick_views(&self) -> impl Iterator<Item = BrickView<'_>> {
+        self.bricks.iter().map(|brick| BrickView { brick, palette: &self.palette })
     }
 
     /// Number of observed voxels whose log-odds are at least a threshold.
