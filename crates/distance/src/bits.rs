@@ -162,7 +162,8 @@ mod tests {
                 let lowest = [0, 1, 2]
                     .map(|k| 8 * ((min[k] as i32 + random.below(size[k] as u64 + 16) as i32 - 8) / 8));
                 let mut mask = [0; 8];
-                for _ in 0..random.below([20, 90][random.below(2) as usize]) {
+                let most = [20, 90][random.below(2) as usize];
+                for _ in 0..random.below(most) {
                     let voxel = lowest.map(|k| k + random.below(8) as i32);
                     let before = mask;
                     add_to_mask(&mut mask, place_of_voxel(voxel));
