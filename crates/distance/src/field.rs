@@ -139,6 +139,39 @@ impl DistanceField {
         Self { grid, options, extent, scale, chunks: extent.size[0].div_ceil(LANES), lines }
     }
 
+    /// Returns the voxels of the field whose center is in a half-open box; voxels outside of the field are unknown.
+    ///
+    /// # Errors
+    ///
+    /// Fails if the box has more than 2^31 voxels.
+    pub fn part(&self, region: &Aabb) -> Result<Self> {
+        let extent = Extent::of(&self.grid.voxels_in(region));
+        extent.check_size()?;
+        let mut part =
+            Self { lines: Vec::new(), extent, chunks: extent.size[0].div_ceil(LANES), ..self.clone_empty() };
+        part.lines =
+            vec![[VoxelDistance::UNKNOWN.to_bits(); LANES]; part.chunks * extent.size[1] * extent.size[2]];
+        let common = Extent::of(&extent.voxels().intersection(&self.extent.voxels()));
+        let at = |outer: &Self, y: usize, z: usize| {
+            let [from_x, from_y, from_z]: [usize; 3] =
+                std::array::from_fn(|k| (common.min[k] - outer.extent.min[k]) as usize);
+            ((from_y + y) * outer.extent.size[2] + from_z + z) * outer.chunks * LANES + from_x
+        };
+        for y in 0..common.size[1] {
+            for z in 0..common.size[2] {
+                let (from, to) = (at(self, y, z), at(&part, y, z));
+                let row = &self.lines.as_flattened()[from..from + common.size[0]];
+                part.lines.as_flattened_mut()[to..to + common.size[0]].copy_from_slice(row);
+            }
+        }
+        Ok(part)
+    }
+
+    /// Returns the field without its distances.
+    fn clone_empty(&self) -> Self {
+        Self::of_lines(self.grid, self.options, self.extent, Vec::new())
+    }
+
     pub(crate) fn into_lines(self) -> Vec<Line> {
         self.lines
     }

@@ -39,6 +39,11 @@ fn fields_of_queries_and_of_parts_equal_those_of_maps() {
         for voxel in voxels_of(&part.voxel_box().intersection(&voxels)) {
             assert_eq!(field.voxel(voxel), part.voxel(voxel), "case {case}: {voxel:?}");
         }
+        let region_of_part = random_region(random);
+        let of_part = part.part(&region_of_part).unwrap();
+        for voxel in voxels_of(&of_part.voxel_box()) {
+            assert_eq!(of_part.voxel(voxel), part.voxel(voxel));
+        }
         let in_order = voxels_of(&voxels).map(|voxel| field.voxel(voxel));
         assert!(in_order.eq(field.to_array()));
     }
