@@ -43,8 +43,7 @@
 //!
 //! # Out of scope
 //!
-//! Localisation and SLAM (scans must have poses), meshes and distance fields, databases of points, concurrent writers
-//! of one map.
+//! Localisation and SLAM (scans must have poses), meshes, databases of points, concurrent writers of one map.
 //!
 //! # Limits
 //!
@@ -54,7 +53,7 @@
 //! # Other crates
 //!
 //! This crate is the engine. `voxtile-formats` reads scans and writes voxels, `voxtile-local` is the local map around a
-//! robot, `voxtile-share` shares occupied voxels with other robots, `voxtile-bucket` stores maps in an object store,
+//! robot, `voxtile-distance` computes distances to obstacles, `voxtile-share` shares occupied voxels with other robots, `voxtile-bucket` stores maps in an object store,
 //! `voxtile-render` creates pictures and levels of detail, and `voxtile-cli` is the command `voxtile`.
 
 mod config;

@@ -4,6 +4,7 @@
 //! map            Map: lifetime, inserts, queries
 //! questions      queries of arrays of points, rays and boxes
 //! local_map      LocalMap: obstacles around the robot
+//! distance       distances to the nearest obstacle
 //! operations     whole maps on disk
 //! remapping      replays of kept scans: new poses, other parameters, removals
 //! scan_iterator  files of scans
@@ -20,6 +21,7 @@ mod arrays;
 mod calls;
 mod command;
 mod config;
+mod distance;
 mod errors;
 mod keywords;
 mod local_map;
@@ -43,6 +45,8 @@ mod _voxtile {
     use super::calls::{call_build, call_export, call_export_scans};
     #[pymodule_export]
     use super::command::run_command;
+    #[pymodule_export]
+    use super::distance::{DistanceField, compute_distances};
     #[pymodule_export]
     use super::local_map::LocalMap;
     #[pymodule_export]

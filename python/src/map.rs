@@ -2,6 +2,7 @@
 
 use crate::arrays::{PointSlice, Points, column, doubles, object, rows};
 use crate::config::{ConfigArguments, bytes_of, config_of};
+use crate::distance::{DistanceField, options_of};
 use crate::errors::{exception, exception_of_kind, wrong};
 use crate::questions::{self, bodies_of};
 use crate::report::InsertReport;
@@ -24,6 +25,7 @@ use voxtile::{
     Aabb, MapConfig, MapOptions, MapQueries, OutOfCoreTileMapper, RayQuery, Result, ScanPoints, ScanRef,
     ScanReport, SnapshotName, Stop, TileIndex, UnknownAs,
 };
+use voxtile_distance::MapDistances;
 
 /// Up to this many queries, or points to insert, start on the calling thread and move to another one only if they take
 /// long.
@@ -611,6 +613,26 @@ impl Map {
             std::array::from_fn(|k| (i64::from(voxels.end[k]) - i64::from(voxels.min[k])).max(0));
         let corner = voxels.min.map(|index| self.config.grid.corner_m(index));
         Ok((array.call_method1("reshape", (edges,))?, column(py, corner.to_vec())))
+    }
+
+    /// Distances of the voxels of a region to the nearest obstacle, up to `max_distance`. Obstacles outside of the region
+    /// count.
+    ///
+    /// `unknown` voxels have an unknown distance and shorten no other ("unknown"), or are "free" or an "obstacle".
+    /// `signed` makes distances inside obstacles negative.
+    #[pyo3(signature = (region, *, max_distance=5.0, unknown="unknown", signed=false))]
+    fn distance_field(
+        &self,
+        py: Python<'_>,
+        region: &Bound<'_, PyAny>,
+        max_distance: f64,
+        unknown: &str,
+        signed: bool,
+    ) -> PyResult<DistanceField> {
+        let (region, options) = (region_of(region)?, options_of(py, max_distance, unknown, signed)?);
+        let source = self.source(py)?;
+        let field = finished(py, move |stop| source.ask(stop, |map| map.distance_field(&region, options)))?;
+        Ok(DistanceField::new(field))
     }
 
     /// Digest of the map's content, as the command prints it. Equal maps have equal digests.

@@ -5,7 +5,9 @@ use super::table::Table;
 use crate::octree::Octree;
 use crate::scan::TileUpdates;
 use crate::sensor::{Evidence, SensorModel};
-use crate::space::{BrickCode, Grid, MortonCode, TileIndex, VoxelBox, VoxelIndex, VoxelKey};
+use crate::space::{
+    BRICK_EDGE, BrickCode, BrickMask, Grid, MortonCode, TileIndex, VoxelBox, VoxelIndex, VoxelKey, places,
+};
 use serde::Serialize;
 use std::ops::AddAssign;
 
@@ -134,6 +136,29 @@ impl Tile {
         self.table
             .voxels_of_brick(brick)
             .map(|(code, evidence)| Voxel { index: self.index_of(code), evidence })
+    }
+
+    /// Visits the bricks with observed voxels that overlap a box, in no particular order: the lowest voxel of the brick,
+    /// which may be outside of the tile, the mask of its observed voxels, and the mask of those whose log-odds are at
+    /// least a threshold.
+    pub fn for_each_brick_in(
+        &self,
+        voxels: &VoxelBox,
+        log_odds: f64,
+        mut visit: impl FnMut(VoxelIndex, &BrickMask, &BrickMask),
+    ) {
+        for brick in self.table.brick_views() {
+            let observed = brick.observed();
+            // The index of a voxel of the tile is unique, that of the brick's lowest voxel may be outside of it.
+            let Some(place) = places(observed).next() else { continue };
+            let lowest = self.index_of(brick.code().voxel(place)).map(|k| k & !(BRICK_EDGE - 1));
+            let is_inside =
+                |k: usize| lowest[k] < voxels.end[k] && lowest[k].saturating_add(BRICK_EDGE) > voxels.min[k];
+            if (0..3).all(is_inside) {
+                let from = if brick.is_below(log_odds) { [0; 8] } else { brick.mask_from(log_odds) };
+                visit(lowest, &observed, &from);
+            }
+        }
     }
 
     /// Index of the voxel of this tile with the given code.

@@ -2,6 +2,7 @@
 mod bucket;
 mod build;
 mod clean;
+mod distance;
 mod edit;
 mod export;
 mod help;
@@ -21,6 +22,7 @@ pub use build::{
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use clap_complete::Shell;
 pub use clean::CleanArgs;
+pub use distance::DistanceArgs;
 pub use edit::{ClearArgs, CropArgs, DecayArgs, MergeArgs};
 pub use export::{ExportArgs, WhatName};
 pub use local::{LocalArgs, PresetName};
@@ -91,6 +93,8 @@ pub enum Command {
     Raycast(RaycastArgs),
     /// Export voxels, their surface or the octree of a map to a file for other programs
     Export(ExportArgs),
+    /// Compute the distances of voxels to the nearest obstacle, for planners
+    Distance(DistanceArgs),
     /// Draw a map as PNG: from above, as a slice, from a side, or its changes
     Picture(PictureArgs),
     /// Write a report on a map with pictures, statistics and damage, as one HTML file
@@ -172,6 +176,7 @@ impl Command {
             Self::Query(args) => args.json,
             Self::Raycast(args) => args.json,
             Self::Export(args) => args.json,
+            Self::Distance(args) => args.json,
             Self::Picture(args) => args.json,
             Self::Report(args) => args.json,
             Self::Digest(args) => args.json,

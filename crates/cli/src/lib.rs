@@ -14,6 +14,7 @@ mod decay;
 mod demo;
 mod diff;
 mod digest;
+mod distance;
 mod export;
 mod failure;
 mod import;

@@ -5,9 +5,9 @@ use super::failure::JsonTo;
 #[cfg(feature = "view")]
 use super::view;
 use super::{
-    build, clean, clear, completions, convert, crop, decay, demo, diff, digest, export, import, info, local,
-    logging, man, merge, option_names, picture, query, quiet, raycast, remap, remove_points, remove_scans,
-    repair, report, revert, scans, share, snapshot, snapshots, threads, verify,
+    build, clean, clear, completions, convert, crop, decay, demo, diff, digest, distance, export, import,
+    info, local, logging, man, merge, option_names, picture, query, quiet, raycast, remap, remove_points,
+    remove_scans, repair, report, revert, scans, share, snapshot, snapshots, threads, verify,
 };
 #[cfg(feature = "bucket")]
 use super::{pull, push};
@@ -59,6 +59,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
         Command::Export(args) => export::run(&args, quiet),
         Command::Picture(args) => picture::run(&args, quiet),
         Command::Report(args) => report::run(&args, quiet),
+        Command::Distance(args) => distance::run(&args),
         Command::Digest(args) => digest::run(&args),
         Command::Snapshot(args) => snapshot::run(&args),
         Command::Snapshots(args) => snapshots::run(&args),
@@ -150,6 +151,7 @@ fn is_parallel(command: &Command) -> bool {
         | Command::Clean(_)
         | Command::Local(_)
         | Command::Demo(_)
+        | Command::Distance(_)
         | Command::Export(_)
         | Command::Info(_)
         | Command::Picture(_)

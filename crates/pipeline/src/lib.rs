@@ -7,6 +7,7 @@
 //!   -> ScanReader, in its own thread -> ScanQueue -> Ingest         scan_reader, scan_queue, ingest
 //!   -> a mapper -> Summary                                          summary
 //! ExportOptions -> export -> ExportSummary                          export/, output/
+//! write_distances_npz, write_distances_png                          distance_files
 //! read_moving_points: marked points of kept scans                    moving_points
 //! numbers: lists of numbers used by all front ends                  numbers
 //! PolygonFile: an area of GeoJSON                                   polygon_file
@@ -17,6 +18,7 @@ mod answer;
 mod build;
 mod build_config;
 mod build_options;
+mod distance_files;
 mod export;
 mod failed_flush;
 #[cfg(feature = "bucket")]
@@ -46,6 +48,7 @@ mod watch;
 pub use answer::{Answer, answer_at};
 pub use build::build;
 pub use build_options::{BuildOptions, SensorModelKind};
+pub use distance_files::{layer_of, write_distances_npz, write_distances_png};
 pub use export::{
     ExportOptions, ExportSummary, ExportedScans, POSES_NAME, WhichPoints, WhichVoxels, Written, export,
     export_scans,

@@ -12,6 +12,7 @@ import atexit
 
 from . import errors
 from ._voxtile import (
+    DistanceField,
     InsertReport,
     LocalMap,
     Map,
@@ -19,6 +20,7 @@ from ._voxtile import (
     TileIterator,
     clean,
     clear,
+    compute_distances,
     convert,
     crop,
     decay,
@@ -45,6 +47,7 @@ atexit.register(wait_for_all)
 del wait_for_all
 
 __all__ = [
+    "DistanceField",
     "InsertReport",
     "LocalMap",
     "Map",
@@ -54,6 +57,7 @@ __all__ = [
     "build",
     "clean",
     "clear",
+    "compute_distances",
     "convert",
     "crop",
     "decay",

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 __all__ = [
+    "DistanceField",
     "InsertReport",
     "LocalMap",
     "Map",
@@ -20,6 +21,7 @@ __all__ = [
     "call_export_scans",
     "clean",
     "clear",
+    "compute_distances",
     "convert",
     "count_scans",
     "crop",
@@ -53,6 +55,7 @@ _Progress: TypeAlias = Callable[[int, int], object]
 _Pose: TypeAlias = ArrayLike | tuple[ArrayLike, ArrayLike]
 _Scan: TypeAlias = tuple[ArrayLike, _Pose] | tuple[ArrayLike, _Pose, ArrayLike | None]
 _Unknown: TypeAlias = Literal["free", "obstacle"]
+_UnknownRule: TypeAlias = Literal["unknown", "free", "obstacle"]
 _Storage: TypeAlias = Literal["octomap", "compact"]
 _InsertMode: TypeAlias = Literal["per-scan", "per-ray"]
 _Clearing: TypeAlias = Literal["octomap", "guarded"]
@@ -116,6 +119,32 @@ class LocalMap:
     def collides(self, boxes: ArrayLike, *, inflated: bool = True) -> NDArray[np.bool_]: ...
 
 @final
+@final
+class DistanceField:
+    @staticmethod
+    def open(folder: _Path, *, memory: int | str | None = None) -> DistanceField: ...
+    @property
+    def resolution(self) -> float: ...
+    @property
+    def max_distance(self) -> float: ...
+    @property
+    def unknown(self) -> _UnknownRule: ...
+    @property
+    def signed(self) -> bool: ...
+    @property
+    def bounds(self) -> NDArray[np.float64] | None: ...
+    def at(self, points: ArrayLike) -> NDArray[np.float64]: ...
+    def at_with_gradient(self, points: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]: ...
+    def clearance_along(self, path: ArrayLike, radius: float) -> dict[str, Any]: ...
+    @overload
+    def to_dense(
+        self, region: ArrayLike | None = None, values: Literal["metres"] = "metres"
+    ) -> tuple[NDArray[np.float32], NDArray[np.float64]]: ...
+    @overload
+    def to_dense(
+        self, region: ArrayLike | None = None, *, values: Literal["squared_voxels"]
+    ) -> tuple[NDArray[np.int16], NDArray[np.float64]]: ...
+
 class Map:
     @staticmethod
     def create(
@@ -268,6 +297,17 @@ def clean(
     parked_scans: int | None = None,
     keep_as: str | None = None,
     dry_run: bool = False,
+    memory: int | str | None = None,
+    progress: _Progress | None = None,
+) -> dict[str, Any]: ...
+def compute_distances(
+    map: _MapOrSnapshot,
+    folder: _Path,
+    *,
+    max_distance: float = 5.0,
+    unknown: _UnknownRule = "unknown",
+    signed: bool = False,
+    region: ArrayLike | None = None,
     memory: int | str | None = None,
     progress: _Progress | None = None,
 ) -> dict[str, Any]: ...

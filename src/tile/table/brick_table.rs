@@ -189,6 +189,11 @@ impl Table {
         })
     }
 
+    /// Views of the bricks with observed voxels, in no particular order.
+    pub(crate) fn brick_views(&self) -> impl Iterator<Item = BrickView<'_>> {
+        self.bricks.iter().map(|brick| BrickView { brick, palette: &self.palette })
+    }
+
     /// Number of observed voxels whose log-odds are at least a threshold.
     pub fn count_from(&self, threshold: f64) -> usize {
         let holds = |evidence: Evidence| evidence.log_odds >= threshold;

@@ -1,7 +1,7 @@
 use super::brick::Brick;
 use super::palette::Palette;
 use crate::sensor::Evidence;
-use crate::space::BrickMask;
+use crate::space::{BrickCode, BrickMask};
 
 /// View of a brick of a table, for reading many of its voxels.
 #[derive(Clone, Copy)]
@@ -20,6 +20,11 @@ impl BrickView<'_> {
     #[inline]
     pub(crate) fn is_observed(&self, place: usize) -> bool {
         self.brick.observed[place / 64] >> (place % 64) & 1 == 1
+    }
+
+    /// Code of the brick.
+    pub(crate) fn code(&self) -> BrickCode {
+        self.brick.code()
     }
 
     pub(crate) fn observed(&self) -> BrickMask {

@@ -38,11 +38,12 @@ fn every_object_has_the_version_and_the_same_shapes() {
     let scans = text(&scans);
     let (map, bt, csv) = (&*path("map"), &*path("a.bt"), &*path("a.csv"));
     let (crop, merged, small, demo) = (&*path("crop"), &*path("merged"), &*path("small"), &*path("demo"));
+    let field = &*path("field");
     let (picture, points) = (&*path("local.png"), &*path("points.txt"));
     fs::write(points, "4.1 -0.5 0.6\n1 0 0.6\n99 99 99\n").unwrap();
     let part = ["--region", "0", "-1", "0", "5", "1", "2"];
     let ray = ["--origin", "0.05", "0.05", "0.6", "--direction"];
-    let runs: [&[&str]; 25] = [
+    let runs: [&[&str]; 26] = [
         &["build", scans, "-o", map],
         &["info", map],
         &["query", map, "--points", points],
@@ -52,6 +53,7 @@ fn every_object_has_the_version_and_the_same_shapes() {
         &["export", map, "-o", csv, "--origin", "100", "0", "0"],
         &["info", bt],
         &["digest", map],
+        &["distance", map, "-o", field, "--max-distance", "1"],
         &["snapshot", map, "good"],
         &["build", scans, "-o", map, "--append", "--again"],
         &["snapshots", map],

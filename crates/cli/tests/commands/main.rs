@@ -6,6 +6,8 @@
 mod bag1;
 /// Main commands.
 mod cli;
+/// Distance fields.
+mod cli_distance;
 /// merge, crop, clear and decay.
 mod cli_edit;
 /// Exports: atomic, never over other files.

@@ -8,6 +8,7 @@
 //! sorted in unnamed files in the output's folder. Memory does not grow with the voxels, except for the 2D grids of
 //! `nav2` and `heightmap`.
 
+mod arrays;
 mod autoware;
 mod column_grid;
 #[cfg(feature = "las")]
@@ -58,6 +59,7 @@ mod tiff_file;
 mod xyz;
 mod zip_store;
 
+pub use arrays::{NpyArray, write_arrays};
 pub use file_unit::FileUnit;
 pub use options::WriteOptions;
 pub use output_format::{OpenFiles, OpenStream, Origin, OutputFormat, OutputOption, Writer};

@@ -77,7 +77,7 @@ impl Column {
 }
 
 /// Returns the header of a `.npy` file, version 1.0: a Python dictionary literal, padded to a multiple of 64 bytes.
-fn npy_head(of: &str, shape: &str) -> Vec<u8> {
+pub(super) fn npy_head(of: &str, shape: &str) -> Vec<u8> {
     let mut words = format!("{{'descr': '{of}', 'fortran_order': False, 'shape': {shape}, }}");
     while (10 + words.len() + 1) % 64 != 0 {
         words.push(' ');

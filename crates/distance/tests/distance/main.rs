@@ -1,0 +1,7 @@
+//! Distance fields compared with a brute force, in memory, live and in folders.
+
+mod fields;
+mod folder;
+mod live;
+mod naive;
+mod random_map;
