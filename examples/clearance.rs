@@ -38,15 +38,16 @@ fn path(field: &DistanceField, [from, to]: [VoxelIndex; 2], wanted_m: f64) -> Op
 
 fn main() -> voxtile::Result<()> {
     let mut map = InMemoryMapper::new(MapConfig::new(0.2, 10.0)?.with_range(0.5, 60.0))?;
-    let scans: Vec<_> = Survey::demo(1).take(40).collect();
+    let scans: Vec<_> = Survey::demo(1).take(60).collect();
     scans.iter().try_for_each(|scan| map.insert_scan(scan).map(drop))?;
-    let [start, end] = [scans[0].origin, scans[39].origin];
-    let region = Aabb::from_corners(start.map(|k| k - 40.0), end.map(|k| k + 40.0));
-    let options = DistanceOptions::new(3.0).with_unknown(UnknownRule::Obstacle);
+    let [start, end] = [scans[0].origin, scans[59].origin];
+    let ends = Aabb::from_corners(start, end);
+    let region = Aabb { min: ends.min.map(|k| k - 10.0), max: ends.max.map(|k| k + 10.0) };
+    let options = DistanceOptions::new(3.0).with_unknown(UnknownRule::Free);
     let field = map.distance_field(&region, options)?;
     let ends =
         [start, end].map(|point| field.grid().voxel_of([point[0], point[1], start[2]]).unwrap_or_default());
-    for (name, wanted_m) in [("shortest", 0.0), ("with clearance", 2.0)] {
+    for (name, wanted_m) in [("shortest", 0.0), ("with clearance", 3.0)] {
         let Some(path) = path(&field, ends, wanted_m) else {
             println!("{name}: no path");
             continue;
