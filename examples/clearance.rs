@@ -52,8 +52,7 @@ fn main() -> voxtile::Result<()> {
             println!("{name}: no path");
             continue;
         };
-        let clearance = field.clearance_along(&path, 0.0)?;
-        let least_m = clearance.min_distance_m.unwrap_or(0.0);
+        let least_m = field.clearance_along(&path, 0.0)?.min_distance_m.unwrap_or(0.0);
         println!("{name}: {} steps, at least {least_m:.1} m from obstacles", path.len());
     }
     Ok(())
