@@ -14,6 +14,7 @@ target=${CARGO_TARGET_DIR:-target}
 
 list() {
     echo "benchmarks, to run with tools/bench.sh NAME:"
+    echo "  distance   distance fields compared with edt and scipy, updates, points: docs/measurements/distance.md"
     echo "  endurance  memory, cost of a scan, speed in little memory, over distance: docs/measurements/endurance.md"
     echo "  octocache  the questions of the OctoCache paper: docs/measurements/octocache.md"
     echo "  peers      speed, memory and exactness compared with OctoMap: a table on standard output"
@@ -46,6 +47,8 @@ peers() {
 }
 
 static() { tools/static_map/run.sh "$@"; }
+
+distance() { tools/distance/run.sh "$@"; }
 
 # Builds the programs of both versions, the earlier one from its own checkout.
 versions() {
