@@ -79,7 +79,7 @@ name=${1:-}
 shift || true
 case $name in
 "") list ;;
-endurance | octocache | peers | static | versions) "$name" "$@" ;;
+distance | endurance | octocache | peers | static | versions) "$name" "$@" ;;
 all)
     failed=()
     for name in endurance octocache peers; do
