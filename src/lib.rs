@@ -53,8 +53,9 @@
 //! # Other crates
 //!
 //! This crate is the engine. `voxtile-formats` reads scans and writes voxels, `voxtile-local` is the local map around a
-//! robot, `voxtile-distance` computes distances to obstacles, `voxtile-share` shares occupied voxels with other robots, `voxtile-bucket` stores maps in an object store,
-//! `voxtile-render` creates pictures and levels of detail, and `voxtile-cli` is the command `voxtile`.
+//! robot, `voxtile-distance` computes distances to obstacles, `voxtile-share` shares occupied voxels with other robots,
+//! `voxtile-bucket` stores maps in an object store, `voxtile-render` creates pictures and levels of detail, and
+//! `voxtile-cli` is the command `voxtile`.
 
 mod config;
 mod error;

@@ -14,6 +14,7 @@ target=${CARGO_TARGET_DIR:-target}
 
 list() {
     echo "benchmarks, to run with tools/bench.sh NAME:"
+    echo "  distance   distance fields compared with edt and scipy, updates, points: docs/measurements/distance.md"
     echo "  endurance  memory, cost of a scan, speed in little memory, over distance: docs/measurements/endurance.md"
     echo "  octocache  the questions of the OctoCache paper: docs/measurements/octocache.md"
     echo "  peers      speed, memory and exactness compared with OctoMap: a table on standard output"
@@ -47,6 +48,8 @@ peers() {
 
 static() { tools/static_map/run.sh "$@"; }
 
+distance() { tools/distance/run.sh "$@"; }
+
 # Builds the programs of both versions, the earlier one from its own checkout.
 versions() {
     local options=() commit= source=$target/versions/source
@@ -76,7 +79,7 @@ name=${1:-}
 shift || true
 case $name in
 "") list ;;
-endurance | octocache | peers | static | versions) "$name" "$@" ;;
+distance | endurance | octocache | peers | static | versions) "$name" "$@" ;;
 all)
     failed=()
     for name in endurance octocache peers; do

@@ -90,15 +90,15 @@ def test_paths_and_signs(tmp_path: Path) -> None:
 def test_wrong_arguments_are_refused(tmp_path: Path) -> None:
     with built(tmp_path / "map") as room:
         for cap in (0.0, np.nan, 100.0):
-            with pytest.raises(errors.InvalidArgumentError, match="from 0.25 m to 45.25 m"):
+            with pytest.raises(errors.ArgumentError, match="from 0.25 m to 45.25 m"):
                 room.distance_field(REGION, max_distance=cap)
-        with pytest.raises(errors.InvalidArgumentError, match="'unknown', 'free', 'obstacle'"):
+        with pytest.raises(errors.ArgumentError, match="'unknown', 'free', 'obstacle'"):
             room.distance_field(REGION, unknown="maybe")  # type: ignore[arg-type]
         field = room.distance_field(REGION, max_distance=1.0)
-        with pytest.raises(errors.InvalidArgumentError, match="radius"):
+        with pytest.raises(errors.ArgumentError, match="radius"):
             field.clearance_along([[0, 0, 0]], 2.0)
-    with pytest.raises(errors.InvalidArgumentError, match="voxtile distance"):
+    with pytest.raises(errors.ArgumentError, match="voxtile distance"):
         voxtile.DistanceField.open(tmp_path)
     voxtile.compute_distances(tmp_path / "map", tmp_path / "field", max_distance=1.0)
-    with pytest.raises(errors.InvalidArgumentError, match="region"):
+    with pytest.raises(errors.ArgumentError, match="region"):
         voxtile.DistanceField.open(tmp_path / "field").to_dense()

@@ -5,6 +5,7 @@ use voxtile::mapper::{MapStatistics, MapView, TileRef};
 use voxtile::scan::PointBatch;
 use voxtile::space::{Aabb, Point, TileBox};
 use voxtile::{InMemoryMapper, MapConfig, Mapper, Result, Scan, TileIndex};
+use voxtile_distance::DistanceOptions;
 use voxtile_render::{ColorBy, Drawn, Image, Picture, SideAxis, Survey, View, colors};
 
 const RESOLUTION_M: f64 = 0.5;
@@ -343,4 +344,22 @@ fn moving_points_cover_the_map() {
     let mut nothing = with_legend.start(&empty, |_, _| {}).unwrap();
     nothing.add_moving(&points);
     assert_eq!(nothing.finish().moving_points, Some(0));
+}
+
+#[test]
+fn a_slice_of_distances_shows_free_voxels_by_distance_and_obstacles_light() {
+    let row = |y: i32| (0..12).map(move |x| center([x, y, 0])).collect::<Vec<_>>();
+    let map = map_of(&row(0), &[row(1), row(2), row(4)].concat());
+    let mut picture = plain().with_view(View::Slice { z_m: 0.1, thickness_m: 0.0 });
+    let options = DistanceOptions::new(1.0);
+    let drawn = picture.start_distances(&map, options, |_, _| {}).unwrap().finish();
+    assert_eq!((drawn.range, drawn.solid_cells, drawn.known_cells), (Some([0.0, 1.0]), 12, 48));
+    let obstacle = cell(&drawn, [5, 0]);
+    assert!(obstacle.iter().all(|part| *part > 200), "{obstacle:?}");
+    assert_eq!(cell(&drawn, [5, 1]), colors::color_of(0.5));
+    assert_eq!(cell(&drawn, [5, 2]), colors::color_of(1.0));
+    assert_eq!(cell(&drawn, [5, 3]), colors::UNKNOWN);
+    assert_eq!(cell(&drawn, [5, 4]), colors::color_of(1.0));
+    assert!(plain().start_distances(&map, options, |_, _| {}).is_err());
+    assert!(plain().with_color(ColorBy::Distance).draw(&map, |_, _| {}).is_err());
 }

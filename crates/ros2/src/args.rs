@@ -1,4 +1,5 @@
 use crate::clearing_rule::ClearingRule;
+use crate::distances::Distances;
 use crate::listen_address::ListenAddress;
 use crate::log_format::LogFormat;
 use crate::names::Names;
@@ -155,6 +156,19 @@ pub struct Args {
     /// Inflate only occupied voxels within this distance of the sensor
     #[arg(long, value_name = "M", default_value_t = 8.0)]
     pub inflation_range: f64,
+
+    /// Cap of the distances to the nearest obstacle (topic distance_field, service get_esdf_and_gradient)
+    #[arg(long, value_name = "M", default_value_t = 2.0)]
+    pub distance_max: f64,
+    /// Publish distances up to this horizontal distance from the sensor
+    #[arg(long, value_name = "M", default_value_t = 5.0)]
+    pub distance_radius: f64,
+    /// Publish distances up to this height above and below the sensor
+    #[arg(long, value_name = "M", default_value_t = 1.0)]
+    pub distance_height: f64,
+    /// Interval between publications of distances; without subscribers they are not computed
+    #[arg(long, value_name = "S", default_value_t = 0.2)]
+    pub distance_every: f64,
 
     /// Name of the node; also the prefix of some service names
     #[arg(long, value_name = "NAME", default_value = DEFAULT_NODE_NAME)]
@@ -357,6 +371,15 @@ impl Args {
         let radius_m = self.projected_radius.unwrap_or(extent.radius_m);
         ensure!(radius_m > 0.0, "--projected-radius: {radius_m} is not a valid radius; give metres above 0");
         Ok(Extent { radius_m, ..extent })
+    }
+
+    /// Returns the parameters of the distance field.
+    ///
+    /// # Errors
+    ///
+    /// Invalid lengths or an invalid duration.
+    pub fn distances(&self) -> anyhow::Result<Distances> {
+        Distances::new(self.distance_every, self.distance_max, self.distance_radius, self.distance_height)
     }
 
     /// Returns the box outside of which points are ignored, in the map frame.

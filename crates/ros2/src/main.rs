@@ -18,6 +18,7 @@ mod cloud_points;
 mod cloud_queue;
 mod corrections;
 mod counters;
+mod distances;
 mod drop_warnings;
 mod first_map;
 mod frame_owners;

@@ -27,6 +27,14 @@ SERVICES = {
         POINTS.format("from_point", "to_point") + "float64 radius\nbool unknown_is_obstacle\n",
         HIT,
     ),
+    "nvblox_msgs/EsdfAndGradients": (
+        "bool update_esdf\nbool visualize_esdf\nbool use_aabb\nstring frame_id\ngeometry_msgs/Point aabb_min_m\n"
+        "geometry_msgs/Vector3 aabb_size_m\ngeometry_msgs/Point[] aabbs_to_clear_min_m\n"
+        "geometry_msgs/Vector3[] aabbs_to_clear_size_m\ngeometry_msgs/Point[] spheres_to_clear_center_m\n"
+        "float32[] spheres_to_clear_radius_m\n",
+        "std_msgs/Header header\ngeometry_msgs/Point origin_m\nfloat32 voxel_size_m\n"
+        "std_msgs/Float32MultiArray esdf_and_gradients\nbool success\n",
+    ),
 }
 MESSAGES = [
     "sensor_msgs/PointCloud2",

@@ -241,6 +241,25 @@ class DiagnosticArray(IdlStruct, typename="diagnostic_msgs::msg::dds_::Diagnosti
     status: sequence[DiagnosticStatus]
 
 
+@dataclass
+class MultiArrayDimension(IdlStruct, typename="std_msgs::msg::dds_::MultiArrayDimension_"):
+    label: str
+    size: uint32
+    stride: uint32
+
+
+@dataclass
+class MultiArrayLayout(IdlStruct, typename="std_msgs::msg::dds_::MultiArrayLayout_"):
+    dim: sequence[MultiArrayDimension]
+    data_offset: uint32
+
+
+@dataclass
+class Float32MultiArray(IdlStruct, typename="std_msgs::msg::dds_::Float32MultiArray_"):
+    layout: MultiArrayLayout
+    data: sequence[float32]
+
+
 # Requests and responses of Cyclone DDS begin with the client's GUID and the sequence number.
 MARKS = {"guid": uint64, "number": int64}
 
@@ -280,6 +299,29 @@ SERVICE_TYPES = {
         "CheckCollision",
         {"from_": Point, "to": Point, "radius": float64, "unknown_is_obstacle": bool},
         HIT,
+    ),
+    "get_esdf_and_gradient": (
+        "nvblox_msgs",
+        "EsdfAndGradients",
+        {
+            "update_esdf": bool,
+            "visualize_esdf": bool,
+            "use_aabb": bool,
+            "frame_id": str,
+            "aabb_min_m": Point,
+            "aabb_size_m": Vector3,
+            "aabbs_to_clear_min_m": sequence[Point],
+            "aabbs_to_clear_size_m": sequence[Vector3],
+            "spheres_to_clear_center_m": sequence[Point],
+            "spheres_to_clear_radius_m": sequence[float32],
+        },
+        {
+            "header": Header,
+            "origin_m": Point,
+            "voxel_size_m": float32,
+            "esdf_and_gradients": Float32MultiArray,
+            "success": bool,
+        },
     ),
 }
 SERVICES = {name: service(*kind, MARKS) for name, kind in SERVICE_TYPES.items()}

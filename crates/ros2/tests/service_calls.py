@@ -59,6 +59,24 @@ def check(call, send_malformed, published, diagnostics):
         answer = call["cast_ray"](origin, wrong, 0.0, False)
         assert not answer.success and answer.message
 
+    def distances(corner, size, spheres=()):
+        radii = [1.0] * len(spheres)
+        return call["get_esdf_and_gradient"](True, False, True, "", corner, size, [], [], list(spheres), radii)
+
+    low = Point(*(at - 0.45 for at in place))
+    field = distances(low, Vector3(0.9, 0.9, 0.9))
+    shape = [dim.size for dim in field.esdf_and_gradients.layout.dim]
+    data = field.esdf_and_gradients.data
+    assert field.success and [dim.label for dim in field.esdf_and_gradients.layout.dim] == ["x", "y", "z"]
+    assert len(data) == shape[0] * shape[1] * shape[2] and abs(field.voxel_size_m - resolution) < 1e-6
+    first = [field.origin_m.x, field.origin_m.y, field.origin_m.z]
+    x, y, z = (round((at - low) / resolution - 0.5) for at, low in zip(place, first))
+    # Inside of the obstacle; unknown voxels are -1000.
+    assert data[(x * shape[1] + y) * shape[2] + z] < 0 and {-1000.0} < set(data)
+    assert all(value == -1000 or abs(value) <= 2.0 for value in data)
+    assert not distances(low, Vector3(0.0, 1.0, 1.0)).success
+    assert not distances(low, Vector3(1.0, 1.0, 1.0), [low]).success
+
     # The name of a snapshot can be reused for the same state, but not for another one.
     assert call["snapshot"]("before").success
     assert call["snapshot"]("before").success

@@ -23,6 +23,7 @@ PUBLISHED = {
     "/projected_map": "nav_msgs::msg::dds_::OccupancyGrid_",
     "/local_occupied": "sensor_msgs::msg::dds_::PointCloud2_",
     "/local_inflated": "sensor_msgs::msg::dds_::PointCloud2_",
+    "/distance_field": "sensor_msgs::msg::dds_::PointCloud2_",
     "/diagnostics": "diagnostic_msgs::msg::dds_::DiagnosticArray_",
 }
 

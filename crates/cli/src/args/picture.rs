@@ -19,6 +19,12 @@ pub struct PictureArgs {
     /// Thickness of the layer, in metres [default: one voxel]
     #[arg(long, value_name = "M", requires = "slice")]
     pub thickness: Option<f64>,
+    /// Draw the distances of the layer at this height to the nearest obstacle, in metres
+    #[arg(long, value_name = "Z", conflicts_with_all = ["slice", "color", "since"])]
+    pub distance_slice: Option<f64>,
+    /// Cap of the distances, in metres
+    #[arg(long, value_name = "M", default_value_t = 5.0, requires = "distance_slice")]
+    pub max_distance: f64,
     #[arg(long, value_name = "WHAT", default_value = "height", help = help::COLOR)]
     pub color: ColorName,
     #[arg(long, value_names = ["X0", "Y0", "Z0", "X1", "Y1", "Z1"], num_args = 6, help = help::VOXELS_IN_BOX)]

@@ -39,8 +39,11 @@ impl DrawnJson {
         Self {
             file: file.display().to_string(),
             from: view_name(args.from),
-            slice_m: args.slice,
-            color: args.since.is_none().then(|| color_name(args.color)),
+            slice_m: args.slice.or(args.distance_slice),
+            color: match args.distance_slice {
+                Some(_) => Some("distance".to_owned()),
+                None => args.since.is_none().then(|| color_name(args.color)),
+            },
             since: args.since.as_ref().map(|since| since.display().to_string()),
             width_px: drawn.image.width_px(),
             height_px: drawn.image.height_px(),

@@ -18,6 +18,7 @@ use std::process::ExitCode;
 use voxtile::mapper::{MapReader, MapView};
 use voxtile::space::Point;
 use voxtile::{Error, Result};
+use voxtile_distance::DistanceOptions;
 use voxtile_pipeline::output::{OutputFile, is_standard_output};
 use voxtile_pipeline::{AnyMap, read_any_map};
 use voxtile_render::{ColorBy, Drawing, Drawn, Picture, SideAxis, View};
@@ -36,8 +37,14 @@ pub fn run(args: &PictureArgs, is_quiet: bool) -> anyhow::Result<ExitCode> {
             check_color(map, args.color)?;
             let with_marks = map_with_marks(args, map)?;
             let progress = Progress::over_tiles(0);
-            let picture = complete(&picture, args, map);
-            let drawing = picture.start(map, |done, all| progress.set(done, all))?;
+            let mut picture = complete(&picture, args, map);
+            let on_progress = |done, all| progress.set(done, all);
+            let drawing = match args.distance_slice {
+                None => picture.start(map, on_progress)?,
+                Some(_) => {
+                    picture.start_distances(map, DistanceOptions::new(args.max_distance), on_progress)?
+                }
+            };
             drop(progress);
             Ok(finish(drawing, args, with_marks)?)
         }),
@@ -118,7 +125,7 @@ impl From<ColorName> for ColorBy {
 }
 
 fn picture_of(args: &PictureArgs) -> Result<Picture> {
-    let view = match (args.slice, args.from) {
+    let view = match (args.slice.or(args.distance_slice), args.from) {
         (Some(z_m), ViewName::Above) => View::Slice { z_m, thickness_m: args.thickness.unwrap_or(0.0) },
         (Some(_), _) => {
             return Err(Error::argument(
@@ -144,7 +151,7 @@ fn complete(picture: &Picture, args: &PictureArgs, map: &AnyMap) -> Picture {
     let path = if args.no_path { Vec::new() } else { path_of(map) };
     let resolution_m = map.config().grid.resolution_m();
     let mut title = format!("{}: {resolution_m} m voxels", name_of(&args.map));
-    if let Some(z_m) = args.slice {
+    if let Some(z_m) = args.slice.or(args.distance_slice) {
         title += &format!(", height {z_m} m");
     }
     if let Some(since) = &args.since {
@@ -190,6 +197,9 @@ fn caption(args: &PictureArgs, drawn: &Drawn, marked: Option<u64>) -> String {
     let [across, up] = axes.map(|axis| region.max[axis] - region.min[axis]);
     let scale = match (drawn.range, args.color) {
         (None, _) => String::new(),
+        (Some([.., most]), _) if args.distance_slice.is_some() => {
+            format!("; distance 0 m (dark) to {most} m")
+        }
         (Some([least, most]), ColorName::Height) => format!("; height {least:.1} m (dark) to {most:.1} m"),
         (Some([least, most]), ColorName::Probability) => format!("; probability {least} (dark) to {most}"),
         (Some([least, most]), ColorName::Count) => format!("; count {least:.0} (dark) to {most:.0}"),

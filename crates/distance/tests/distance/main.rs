@@ -5,3 +5,4 @@ mod folder;
 mod live;
 mod naive;
 mod random_map;
+mod recorded;

@@ -6,8 +6,9 @@ use rayon::prelude::*;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Mutex, PoisonError};
 use voxtile::mapper::MapView;
-use voxtile::space::{Grid, TileIndex, VoxelBox, VoxelIndex};
+use voxtile::space::{Aabb, Grid, TileIndex, VoxelBox, VoxelIndex};
 use voxtile::{Error, Result};
+use voxtile_distance::{DistanceField, DistanceOptions, MapDistances};
 
 #[derive(Clone, Copy)]
 pub(super) enum Source<'a> {
@@ -20,6 +21,8 @@ pub(super) struct Collected {
     /// `None` if no voxel was observed.
     pub known: Option<Known>,
     pub is_difference: bool,
+    /// Cap of the distances in metres; 0 for other pictures.
+    pub max_distance_m: f64,
     pub tiles: u64,
     /// Unreadable tiles, in order.
     pub unread: Vec<TileIndex>,
@@ -32,6 +35,9 @@ pub(super) struct Known {
     pub first: [usize; 2],
     pub count: [usize; 2],
 }
+
+/// Voxels along an edge of the squares whose distances are computed at a time.
+const SQUARE_VOXELS: i32 = 512;
 
 /// Maximum number of tiles to read a second time for finer cells.
 const MAX_TILES_READ_TWICE: usize = 4096;
@@ -62,9 +68,64 @@ impl Collected {
         Ok(Self {
             known,
             is_difference: matches!(source, Source::Two { .. }),
+            max_distance_m: 0.0,
             tiles: tiles.len() as u64,
             unread: std::mem::take(unread),
         })
+    }
+}
+
+impl Collected {
+    /// Computes the distances of one layer of voxels, square by square.
+    pub fn of_distances<V: MapView>(
+        picture: &Picture,
+        map: &V,
+        options: DistanceOptions,
+        progress: &(dyn Fn(u64, u64) + Sync),
+    ) -> Result<Self> {
+        let grid = map.config().grid;
+        let collector = Collector { picture, source: Source::One(map), grid, unread: Mutex::default() };
+        let tiles = collector.tiles();
+        let mut known = None;
+        if let Some(voxels) = collector.bounds(&tiles) {
+            let frame = Frame::new(picture.view, voxels, picture.most_px);
+            let cells = Cells::new(frame.cells[0] * frame.cells[1]);
+            let starts = |k: usize| (voxels.min[k]..voxels.end[k]).step_by(SQUARE_VOXELS as usize);
+            let squares: Vec<[i32; 2]> = starts(0).flat_map(|x| starts(1).map(move |y| [x, y])).collect();
+            for (number, [x, y]) in squares.iter().copied().enumerate() {
+                progress(number as u64, squares.len() as u64);
+                let end = |from: i32, k: usize| from.saturating_add(SQUARE_VOXELS).min(voxels.end[k]);
+                let [min, max] = [[x, y, voxels.min[2]], [end(x, 0), end(y, 1), voxels.end[2]]]
+                    .map(|corner| corner.map(|k| f64::from(k) * grid.resolution_m()));
+                let field = map.distance_field(&Aabb { min, max }, options)?;
+                add_distances(&field, &frame, &cells);
+            }
+            let seen = seen(&frame, &cells);
+            known = seen.map(|(first, count)| Known { frame, cells, first, count });
+        }
+        let max_distance_m = options.max_distance_m;
+        Ok(Self {
+            known,
+            is_difference: false,
+            max_distance_m,
+            tiles: tiles.len() as u64,
+            unread: Vec::new(),
+        })
+    }
+}
+
+/// Adds the distances of a field. A cell of several voxels shows the largest, or an obstacle.
+fn add_distances(field: &DistanceField, frame: &Frame, cells: &Cells) {
+    let (voxels, resolution_m) = (field.voxel_box().intersection(&frame.voxels), field.grid().resolution_m());
+    for z in voxels.min[2]..voxels.end[2] {
+        for y in voxels.min[1]..voxels.end[1] {
+            for x in voxels.min[0]..voxels.end[0] {
+                let distance = field.voxel([x, y, z]).in_metres(resolution_m);
+                let Some(distance_m) = distance.capped_m(field.options().max_distance_m) else { continue };
+                let rank = if distance_m > 0.0 { Rank::Free } else { Rank::Occupied };
+                cells.add(frame.place_of([x, y, z]), Cell { rank, value: distance_m as f32, near: 0 });
+            }
+        }
     }
 }
 
@@ -180,7 +241,7 @@ impl Collector<'_> {
                 ColorBy::LastScan => last_scan,
                 _ if !is_occupied => 0.0,
                 ColorBy::Height => ((f64::from(voxel.index[2]) + 0.5) * resolution_m) as f32,
-                ColorBy::Probability => evidence.probability() as f32,
+                ColorBy::Probability | ColorBy::Distance => evidence.probability() as f32,
             };
             let rank = if is_occupied { Rank::Occupied } else { Rank::Free };
             cells.add(frame.place_of(voxel.index), Cell { rank, value, near: view.nearness(voxel.index) });

@@ -197,6 +197,7 @@ impl<'a> Drawing<'a> {
         let known = self.collected.known.as_ref()?;
         let least = match self.picture.color_by {
             ColorBy::Probability => return Some([0.5, 1.0]),
+            ColorBy::Distance => return Some([0.0, self.collected.max_distance_m]),
             ColorBy::Height => Rank::Occupied,
             ColorBy::Count | ColorBy::LastScan => Rank::Free,
         };
@@ -237,10 +238,12 @@ impl<'a> Drawing<'a> {
             Rank::Changed(Change::Same) => Some(palette::SAME),
             Rank::Changed(Change::Vanished) => Some(palette::VANISHED),
             Rank::Changed(Change::Appeared) => Some(palette::APPEARED),
+            Rank::Occupied if self.picture.color_by == ColorBy::Distance => Some(palette::INK),
             Rank::Occupied => Some(value_color()),
             Rank::Free => match self.picture.color_by {
                 _ if self.collected.is_difference => Some(palette::FREE),
                 ColorBy::Height | ColorBy::Probability => Some(palette::FREE),
+                ColorBy::Distance => Some(value_color()),
                 ColorBy::Count | ColorBy::LastScan => Some(mixed(palette::UNKNOWN, value_color(), 0.4)),
             },
         }

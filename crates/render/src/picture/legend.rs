@@ -135,6 +135,7 @@ fn labels(color_by: ColorBy, [least, most]: [f64; 2]) -> (&'static str, [String;
         ColorBy::Probability => ("probability", [least, most].map(|value| format!("{value:.2}"))),
         ColorBy::Count => ("count", [least, most].map(|value| format!("{value:.0}"))),
         ColorBy::LastScan => ("last scan", [least, most].map(|value| format!("{value:.0}"))),
+        ColorBy::Distance => ("distance", [least, most].map(|value| format!("{value} m"))),
     }
 }
 

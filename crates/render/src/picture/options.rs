@@ -4,6 +4,7 @@ use super::view::{ColorBy, View};
 use voxtile::mapper::MapView;
 use voxtile::space::{Aabb, Point};
 use voxtile::{Error, Result};
+use voxtile_distance::DistanceOptions;
 
 /// Options of a picture of a map.
 ///
@@ -109,6 +110,9 @@ impl Picture {
     /// As [`Picture::draw`].
     pub fn start(&self, map: &dyn MapView, progress: impl Fn(u64, u64) + Sync) -> Result<Drawing<'_>> {
         self.check()?;
+        if self.color_by == ColorBy::Distance {
+            return Err(Error::argument("color", "distances are drawn by `start_distances`"));
+        }
         let knows_scans =
             || map.tile_indices().first().is_none_or(|&tile| map.last_scan_of_tile_hint(tile).is_some());
         if self.color_by == ColorBy::LastScan && !knows_scans() {
@@ -156,6 +160,28 @@ impl Picture {
         }
         let collected = Collected::of(self, Source::Two { before, after }, &progress)?;
         Ok(Drawing::new(self, grid, collected))
+    }
+
+    /// Computes the distances of a layer of voxels to the nearest obstacle, and returns their drawing. The view must be
+    /// [`View::Slice`]; the color is [`ColorBy::Distance`]. `progress` receives the numbers of finished and of all
+    /// parts.
+    ///
+    /// # Errors
+    ///
+    /// Fails if the view is another one, the cap is invalid, or a tile cannot be read.
+    pub fn start_distances<V: MapView>(
+        &mut self,
+        map: &V,
+        options: DistanceOptions,
+        progress: impl Fn(u64, u64) + Sync,
+    ) -> Result<Drawing<'_>> {
+        self.color_by = ColorBy::Distance;
+        self.check()?;
+        if !matches!(self.view, View::Slice { .. }) {
+            return Err(Error::argument("view", "distances are drawn of a slice"));
+        }
+        let collected = Collected::of_distances(self, map, options, &progress)?;
+        Ok(Drawing::new(self, map.config().grid, collected))
     }
 
     fn check(&self) -> Result<()> {

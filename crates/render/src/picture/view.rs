@@ -40,6 +40,9 @@ pub enum ColorBy {
     Count,
     /// Number of the last scan in the tile's latest flush.
     LastScan,
+    /// Distance of free voxels to the nearest obstacle; obstacles are light. Only with
+    /// [`Picture::start_distances`](crate::Picture::start_distances).
+    Distance,
 }
 
 /// Change of a voxel between two states of a map.

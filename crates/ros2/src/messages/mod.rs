@@ -4,6 +4,7 @@
 mod box_request;
 mod diagnostic_array;
 mod empty;
+mod esdf;
 mod get_octomap;
 mod header;
 mod marker_array;
@@ -19,6 +20,7 @@ mod snapshot_request;
 pub use box_request::BoxRequest;
 pub use diagnostic_array::{DiagnosticArray, DiagnosticStatus, KeyValue};
 pub use empty::Empty;
+pub use esdf::{EsdfRequest, EsdfResponse, FloatArray};
 pub use get_octomap::{OctomapInBoxRequest, OctomapInBoxResponse, OctomapResponse};
 pub use header::{Header, Time};
 pub use marker_array::{Color, Marker, MarkerArray};

@@ -31,6 +31,8 @@ const UINT8: u8 = 2;
 const STEP: u32 = 12;
 /// Bytes per point of clouds with the field `state`, padded to alignment.
 const STEP_WITH_STATE: u32 = 16;
+/// Bytes per point of clouds with a further number.
+const STEP_WITH_VALUE: u32 = 16;
 
 impl PointCloud2 {
     /// Returns a cloud in single precision, which all readers of ROS clouds support.
@@ -50,6 +52,18 @@ impl PointCloud2 {
         let mut fields = position_fields().to_vec();
         fields.push(PointField { name: "state".to_owned(), offset: STEP, datatype: UINT8, count: 1 });
         Self::of_data(header, fields, STEP_WITH_STATE, data)
+    }
+
+    /// Returns a cloud with an additional field in single precision.
+    pub fn of_values(header: Header, name: &str, points: impl IntoIterator<Item = ([f64; 3], f32)>) -> Self {
+        let mut data = Vec::new();
+        for (point_m, value) in points {
+            data.extend(point_m.into_iter().flat_map(|value| (value as f32).to_le_bytes()));
+            data.extend(value.to_le_bytes());
+        }
+        let mut fields = position_fields().to_vec();
+        fields.push(PointField { name: name.to_owned(), offset: STEP, datatype: FLOAT32, count: 1 });
+        Self::of_data(header, fields, STEP_WITH_VALUE, data)
     }
 
     /// Returns a cloud with one byte per point. All points are equal.

@@ -4,6 +4,7 @@
 //! LiveMap -> LiveView -> octomap, occupied_voxels, projected_map -> messages
 //! occupied_voxels -> VoxelChanges -> Viewers -> Changing: sends changes
 //! LocalView -> local_obstacles -> messages
+//! LiveMap -> LiveDistances -> distance_field -> messages
 //! Health, Counters -> diagnostics
 //! Publishing: one thread, concurrent with the mapper; Outlet: a topic and the last sent version
 //! ```
@@ -12,6 +13,7 @@ mod bounded_file;
 mod changing;
 mod diagnosing;
 mod diagnostics;
+mod distance_field;
 mod extent;
 mod local_obstacles;
 mod occupied_voxels;

@@ -2,9 +2,10 @@
 //!
 //! ```text
 //! request -> Transport -> orders -> Mapping -> Outcome
-//!                      -> octomaps, queries -> LiveMap
+//!                      -> octomaps, queries, esdf -> LiveMap
 //! ```
 
+mod esdf;
 mod octomaps;
 mod order;
 mod orders;

@@ -1,7 +1,7 @@
-use super::{Order, Orders, octomaps, queries};
+use super::{Order, Orders, esdf, octomaps, queries};
 use crate::args::Args;
 use crate::live_map::LiveMap;
-use crate::messages::{BoxRequest, Empty, Outcome, SnapshotRequest};
+use crate::messages::{BoxRequest, Empty, EsdfRequest, Outcome, SnapshotRequest};
 use crate::transport::{Transport, TypeName};
 use std::sync::Arc;
 use voxtile::SnapshotName;
@@ -37,9 +37,17 @@ pub fn start(
         queries::cast_ray(&live, request)
     })?;
     let live = map.clone();
-    transport.serve("~/check_collision", TypeName::new("voxtile_msgs", "CheckCollision"), move |request| {
-        queries::check_collision(&live, request)
-    })
+    transport.serve(
+        "~/check_collision",
+        TypeName::new("voxtile_msgs", "CheckCollision"),
+        move |request| queries::check_collision(&live, request),
+    )?;
+    let (live, distances) = (map.clone(), args.distances()?);
+    transport.serve(
+        "~/get_esdf_and_gradient",
+        TypeName::new("nvblox_msgs", "EsdfAndGradients"),
+        move |request: EsdfRequest| esdf::in_box(&live, &distances, max_bytes, &request),
+    )
 }
 
 fn change_the_map(transport: &mut Transport, orders: &Orders) -> anyhow::Result<()> {

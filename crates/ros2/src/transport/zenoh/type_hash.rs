@@ -6,7 +6,7 @@ pub fn type_hash(kind: TypeName) -> Option<&'static str> {
 }
 
 /// Hashes of all types that the node uses. `tests/type_hashes.py` computes them from the definitions and compares.
-const HASHES: [(TypeName, &str); 16] = [
+const HASHES: [(TypeName, &str); 17] = [
     (
         TypeName::new("sensor_msgs", "PointCloud2"),
         "RIHS01_9198cabf7da3796ae6fe19c4cb3bdd3525492988c70522628af5daa124bae2b5",
@@ -70,5 +70,9 @@ const HASHES: [(TypeName, &str); 16] = [
     (
         TypeName::new("voxtile_msgs", "CheckCollision"),
         "RIHS01_8f410b4fb8207cbeb368649a39cfe498d49aa8c1ab344f2e7b6d9bc8e62edfd4",
+    ),
+    (
+        TypeName::new("nvblox_msgs", "EsdfAndGradients"),
+        "RIHS01_e080f96a14304e6d24c9598b72b80e0aa20a2cfc1bbc2414a629c907a10eb5b0",
     ),
 ];
