@@ -30,6 +30,7 @@ TYPES = {
     "octomap_point_cloud_changes": (PointCloud2, "sensor_msgs/msg/PointCloud2"),
     "local_occupied": (PointCloud2, "sensor_msgs/msg/PointCloud2"),
     "local_inflated": (PointCloud2, "sensor_msgs/msg/PointCloud2"),
+    "distance_field": (PointCloud2, "sensor_msgs/msg/PointCloud2"),
 }
 
 
@@ -66,8 +67,9 @@ def plain(name, message):
         frame = marker.header.frame_id
         return {"frame": frame, "type": marker.type, "action": marker.action, "scale": scale, "points": points}
     if TYPES[name][0] is PointCloud2:
-        assert [field.name for field in message.fields] == ["x", "y", "z"]
-        points = np.frombuffer(octets(message.data), "<f4").reshape(-1, 3)
+        names = ["x", "y", "z", "distance"][: 4 if name == "distance_field" else 3]
+        assert [field.name for field in message.fields] == names
+        points = np.frombuffer(octets(message.data), "<f4").reshape(-1, len(names))
         assert len(points) == message.width * message.height
         return {"frame": message.header.frame_id, "points": points.astype(float).tolist()}
     if name == "projected_map":
@@ -169,6 +171,20 @@ def compare_local(got, occupied, centers, origin, radius, moment, inflation_rang
     return f"{len(local)} voxels in the local map and {len(inflated)} inflated"
 
 
+def compare_distances(got, log_odds, occupied, centers, origin, radius, resolution):
+    """Checks distances whose nearest obstacle must be in this part of the map against a brute force."""
+    obstacles = np.array([centers[index] for index in occupied])
+    checked = 0
+    for *point, distance in got["distance_field"]["points"][::97]:
+        if np.abs(np.subtract(point, origin)).max() + distance >= radius - resolution:
+            continue
+        assert tuple(round(at / resolution - 0.5) for at in point) in log_odds, f"unknown voxel at {point}"
+        expected = np.linalg.norm(obstacles - point, axis=1).min()
+        assert abs(distance - expected) < 1e-4, f"{distance} m at {point}, not {expected}"
+        checked += 1
+    assert checked > 20, f"only {checked} distances"
+
+
 def compare(file, all_csv, pgm, origin, radius, max_z, moment, inflation_range):
     got = {name: one["message"] for name, one in json.load(open(file)).items()}
     assert set(got) == set(TYPES), f"received only {sorted(got)}"
@@ -207,6 +223,7 @@ def compare(file, all_csv, pgm, origin, radius, max_z, moment, inflation_range):
     assert grid["cells"] == cells, "projected_map differs"
     corner = [float(at) for at in open(pgm.replace(".pgm", ".yaml")).read().split("origin: [")[1].split(",")[:2]]
     assert grid["origin"] == [*corner, 0.0], f"{grid['origin']} and {corner}"
+    compare_distances(got, log_odds, occupied, centers, origin, radius, resolution)
     local = compare_local(got, occupied, centers, origin, radius, moment, inflation_range, resolution)
     print(f"outputs: {len(log_odds)} voxels, {local}, {len(low)} of {len(occupied)} occupied ones below, {size} cells")
 
