@@ -1,4 +1,5 @@
 use crate::args::DistanceArgs;
+use crate::counted::Counted;
 use crate::json;
 use crate::part::region_of;
 use crate::progress::Progress;
@@ -140,23 +141,23 @@ fn print(
     out: &mut impl Write,
 ) -> anyhow::Result<()> {
     if let (Some(report), Some(folder)) = (report, &args.output) {
-        let (tiles, computed) = (HumanCount(report.tiles), HumanCount(report.tiles_computed));
+        let (tiles, computed) = (Counted(report.tiles, "tile"), Counted(report.tiles_computed, "tile"));
         let voxels = HumanCount(report.voxels_computed);
-        writeln!(out, "field     {tiles} tiles in {}", folder.display())?;
-        writeln!(out, "computed  {computed} tiles, {voxels} voxels, in {seconds:.1} s")?;
+        writeln!(out, "field     {tiles} in {}", folder.display())?;
+        writeln!(out, "computed  {computed}, {voxels} voxels, in {seconds:.1} s")?;
         if report.tiles_kept > 0 {
             writeln!(
                 out,
-                "kept      {} tiles: nothing within the cap has changed",
-                HumanCount(report.tiles_kept)
+                "kept      {}: nothing within the cap has changed",
+                Counted(report.tiles_kept, "tile")
             )?;
         }
         if !report.has_obstacles {
             writeln!(out, "note      the map has no obstacles: all distances are beyond the cap or unknown")?;
         }
         if !report.damaged_map_tiles.is_empty() {
-            let damaged = HumanCount(report.damaged_map_tiles.len() as u64);
-            writeln!(out, "damaged   {damaged} tiles of the map: the distances around them are unknown")?;
+            let damaged = Counted(report.damaged_map_tiles.len() as u64, "damaged tile");
+            writeln!(out, "note      {damaged} of the map: distances nearby are unknown")?;
         }
     }
     for path in [&args.npz, &args.png].into_iter().flatten() {
