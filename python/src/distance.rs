@@ -83,7 +83,7 @@ pub struct DistanceField(Arc<Field>);
 
 enum Field {
     Memory(voxtile_distance::DistanceField),
-    Folder(FieldReader),
+    Folder(Box<FieldReader>),
 }
 
 type WithGradient<'py> = (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray2<f64>>);
@@ -166,7 +166,7 @@ impl DistanceField {
     fn open(py: Python<'_>, folder: PathBuf, memory: Option<Bound<'_, PyAny>>) -> PyResult<Self> {
         let memory_bytes = memory.as_ref().map(bytes_of).transpose()?.unwrap_or(DEFAULT_BYTES);
         let field = finished(py, move |_| FieldReader::open(folder, memory_bytes))?;
-        Ok(Self(Arc::new(Field::Folder(field))))
+        Ok(Self(Arc::new(Field::Folder(Box::new(field)))))
     }
 
     /// Edge of a voxel in metres.
