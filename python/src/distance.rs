@@ -83,7 +83,6 @@ pub struct DistanceField(Arc<Field>);
 
 enum Field {
     Memory(voxtile_distance::DistanceField),
-    // Much larger than the other variant.
     Folder(Box<FieldReader>),
 }
 

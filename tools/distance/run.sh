@@ -54,6 +54,12 @@ page() {
 
 Written by `tools/distance/run.sh`. Lengths are in metres, times are CPU times.
 
+![A layer of a hall: free voxels by their distance to the nearest obstacle](distance_hall.png)
+![A layer of a street](distance_street.png)
+
+*`balm_os0_hall` at a height of 0.5 m and `kitti_0001_a`, with guarded clearing, at -0.7 m, drawn by `voxtile picture MAP
+--distance-slice Z --max-distance 3`.*
+
 ## Bulk
 
 One thread. Voxels are those of the output; the surroundings of boxes within the cap are not counted. `folder` reads the

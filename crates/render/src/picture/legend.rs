@@ -74,9 +74,9 @@ impl Legend {
         self.draw_scale(canvas, [right, bar], foot, dot);
         // Colors of free and unknown space.
         let swatch = right.saturating_sub(bar + 74 * dot);
-        for (top, color, label) in
-            [(foot + 4 * dot, palette::FREE, "free"), (line, palette::UNKNOWN, "unknown")]
-        {
+        let is_of_distances = matches!(self.scale, Scale::Values { color_by: ColorBy::Distance, .. });
+        let first = if is_of_distances { (palette::INK, "obstacle") } else { (palette::FREE, "free") };
+        for (top, (color, label)) in [(foot + 4 * dot, first), (line, (palette::UNKNOWN, "unknown"))] {
             draw_swatch(canvas, [swatch, top], dot, color, label);
         }
         if self.has_path {
