@@ -3,7 +3,7 @@ use crate::arrival_watch::ArrivalWatch;
 use crate::inbox::Inbox;
 use crate::live_map::LiveMap;
 use crate::monitor::{Monitor, MonitorServer};
-use crate::publishers::{PUBLISHED_CLOUDS, Publishing};
+use crate::publishers::{DistancePublisher, PUBLISHED_CLOUDS, Publishing};
 use crate::services::{self, Orders};
 use crate::transport::{Message, Qos, Transport, TypeName, spawn};
 use std::sync::Arc;
@@ -76,11 +76,13 @@ pub fn start(
     log::info!("subscribed to {} in domain {}", args.cloud_topics().join(", "), args.domain_id);
     services::start(args, &mut transport, &map, orders)?;
     let mut publishing = Publishing::new(args, &mut transport, inbox.clone(), map.clone())?;
+    let mut distances = DistancePublisher::new(&mut transport, map.clone(), args.distances()?)?;
     let arrivals = ArrivalWatch::new(args, inbox.clone(), transport.graph(), &PUBLISHED_CLOUDS)?;
     let stop = Arc::new(AtomicBool::new(false));
-    let (of_publishing, of_arrivals) = (stop.clone(), stop.clone());
+    let (of_publishing, of_arrivals, of_distances) = (stop.clone(), stop.clone(), stop.clone());
     let mut threads = vec![
         spawn("publisher", move || publishing.run(&of_publishing))?,
+        spawn("distances", move || distances.run(&of_distances))?,
         spawn("arrivals", move || arrivals.run(&of_arrivals))?,
     ];
     if let Some(server) = server {

@@ -1,16 +1,24 @@
 use super::occupied_voxels::MAX_VOXELS;
 use super::outlet::Outlet;
+use super::publishing::POLL_EVERY;
 use crate::distances::Distances;
 use crate::live_map::LiveMap;
 use crate::messages::{Header, PointCloud2};
 use crate::transport::{Transport, TypeName};
 use anyhow::ensure;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 use voxtile::space::VoxelBox;
 use voxtile_distance::{Distance, DistanceField, LiveDistances};
 
-/// Publisher of the distances around the sensor. They are computed only while the topic has a subscriber.
+/// Topic of the distances.
+pub(super) const DISTANCE_FIELD: &str = "distance_field";
+
+/// Publisher of the distances around the sensor. They are computed only while the topic has a subscriber, in a thread of
+/// its own: a large box takes longer than the interval of other topics.
 pub struct DistancePublisher {
+    map: Arc<LiveMap>,
     distances: Distances,
     outlet: Outlet<PointCloud2>,
     live: Option<LiveDistances>,
@@ -21,17 +29,21 @@ impl DistancePublisher {
     /// # Errors
     ///
     /// The transport cannot create the publisher.
-    pub fn new(
-        transport: &mut Transport,
-        topic: &str,
-        kind: TypeName,
-        distances: Distances,
-    ) -> anyhow::Result<Self> {
-        Ok(Self { distances, outlet: Outlet::new(transport, topic, kind)?, live: None, begun: None })
+    pub fn new(transport: &mut Transport, map: Arc<LiveMap>, distances: Distances) -> anyhow::Result<Self> {
+        let kind = TypeName::new("sensor_msgs", "PointCloud2");
+        let outlet = Outlet::new(transport, DISTANCE_FIELD, kind)?;
+        Ok(Self { map, distances, outlet, live: None, begun: None })
+    }
+
+    pub fn run(&mut self, stop: &AtomicBool) {
+        while !stop.load(Ordering::Relaxed) {
+            self.refresh();
+            std::thread::sleep(POLL_EVERY);
+        }
     }
 
     /// Publishes a new version at the interval of the parameters.
-    pub fn refresh(&mut self, map: &LiveMap) {
+    fn refresh(&mut self) {
         if !self.outlet.is_wanted() {
             self.live = None;
             return;
@@ -40,7 +52,8 @@ impl DistancePublisher {
             return;
         }
         self.begun = Some(Instant::now());
-        let (moment, live, distances) = (map.moment(), &mut self.live, self.distances);
+        let (map, live, distances) = (&self.map, &mut self.live, self.distances);
+        let moment = map.moment();
         self.outlet.refresh(moment.version, || {
             let live = match live {
                 Some(live) => live,

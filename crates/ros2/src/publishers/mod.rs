@@ -4,9 +4,9 @@
 //! LiveMap -> LiveView -> octomap, occupied_voxels, projected_map -> messages
 //! occupied_voxels -> VoxelChanges -> Viewers -> Changing: sends changes
 //! LocalView -> local_obstacles -> messages
-//! LiveMap -> LiveDistances -> distance_field -> messages
+//! LiveMap -> LiveDistances -> distance_field -> messages, in a thread of its own
 //! Health, Counters -> diagnostics
-//! Publishing: one thread, concurrent with the mapper; Outlet: a topic and the last sent version
+//! Publishing: one thread for the other topics, concurrent with the mapper; Outlet: a topic and the last sent version
 //! ```
 
 mod bounded_file;
@@ -24,6 +24,7 @@ mod publishing;
 mod viewers;
 mod voxel_changes;
 
+pub use distance_field::DistancePublisher;
 pub use extent::Extent;
 pub use octomap::octomap;
 pub use publishing::{PUBLISHED_CLOUDS, Publishing};

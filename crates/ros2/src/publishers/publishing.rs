@@ -1,7 +1,7 @@
 use super::Extent;
 use super::changing::Changing;
 use super::diagnosing::Diagnosing;
-use super::distance_field::DistancePublisher;
+use super::distance_field::DISTANCE_FIELD;
 use super::local_obstacles::local_obstacles;
 use super::occupied_voxels::{cloud, markers, occupied_voxels};
 use super::octomap::octomap;
@@ -33,21 +33,19 @@ pub struct Publishing {
     local_occupied: Outlet<PointCloud2>,
     local_inflated: Outlet<PointCloud2>,
     changing: Changing,
-    distances: DistancePublisher,
     diagnosing: Diagnosing,
 }
 
 /// Topics of clouds that the node publishes.
-pub const PUBLISHED_CLOUDS: [&str; 5] = [CENTERS, CHANGES, LOCAL_OCCUPIED, LOCAL_INFLATED, DISTANCES];
+pub const PUBLISHED_CLOUDS: [&str; 5] = [CENTERS, CHANGES, LOCAL_OCCUPIED, LOCAL_INFLATED, DISTANCE_FIELD];
 const MARKERS: &str = "occupied_cells_vis_array";
 const PROJECTED_MAP: &str = "projected_map";
 const CENTERS: &str = "octomap_point_cloud_centers";
 const CHANGES: &str = "octomap_point_cloud_changes";
 const LOCAL_OCCUPIED: &str = "local_occupied";
 const LOCAL_INFLATED: &str = "local_inflated";
-const DISTANCES: &str = "distance_field";
 /// Interval between checks of the stop flag.
-const POLL_EVERY: Duration = Duration::from_millis(20);
+pub(super) const POLL_EVERY: Duration = Duration::from_millis(20);
 
 impl Publishing {
     /// # Errors
@@ -73,7 +71,6 @@ impl Publishing {
             local_occupied: Outlet::new(transport, LOCAL_OCCUPIED, cloud)?,
             local_inflated: Outlet::new(transport, LOCAL_INFLATED, cloud)?,
             changing: Changing::new(transport, CHANGES)?,
-            distances: DistancePublisher::new(transport, DISTANCES, cloud, args.distances()?)?,
             diagnosing: Diagnosing::new(transport, &args.node_name)?,
             inbox,
             map,
@@ -87,7 +84,6 @@ impl Publishing {
                 begun = Instant::now();
                 self.refresh();
             }
-            self.distances.refresh(&self.map);
             self.diagnosing.refresh(&self.inbox, &self.map);
             std::thread::sleep(POLL_EVERY);
         }
