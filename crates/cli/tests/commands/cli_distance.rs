@@ -60,7 +60,7 @@ fn a_field_is_computed_updated_and_written_to_files() {
     let drawn = json(&[&["picture", text(&map), "-o", text(&picture), "--json"][..], &slice].concat());
     assert!(drawn["color"] == "distance" && drawn["range"][1] == 0.5 && drawn["solid_cells"] == 1, "{drawn}");
     let printed = output(&["distance", text(&map), "-o", text(&path("other")), "--max-distance", "0.3"]);
-    assert!(printed.starts_with("field     1 tiles in "), "{printed}");
+    assert!(printed.starts_with("field     1 tile in "), "{printed}");
 }
 
 #[test]

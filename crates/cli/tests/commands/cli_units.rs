@@ -13,6 +13,10 @@ fn voxtile(folder: &Path, arguments: &[&str]) -> Result<String, String> {
     }
 }
 
+/// Options of builds from points without rays. Builds also look for poses next to the folder, where other tests may have
+/// files.
+const HITS: [&str; 5] = ["--resolution", "0.5", "--no-rays", "--poses", "identity"];
+
 /// Makes a map of points near a corner of California's zone 5, which `EPSG:2229` describes in US survey feet.
 fn make_map(folder: &Path) {
     let points: Vec<String> = (0..300)
@@ -26,7 +30,7 @@ fn make_map(folder: &Path) {
         })
         .collect();
     fs::write(folder.join("points.xyz"), points.join("\n")).unwrap();
-    voxtile(folder, &["build", "points.xyz", "-o", "map", "--resolution", "0.5", "--no-rays", "-q"]).unwrap();
+    voxtile(folder, &[&["build", "points.xyz", "-o", "map", "-q"][..], &HITS].concat()).unwrap();
 }
 
 fn csv(folder: &Path, map: &str) -> String {
@@ -45,7 +49,7 @@ fn files_in_feet_give_the_same_map() {
         ("c.las", &["--crs", "PROJCS[\"own\",UNIT[\"foot\",0.3048]]"]),
     ] {
         voxtile(folder, &[&["export", "map", "-o", name], options].concat()).unwrap();
-        let build = ["build", name, "-o", "again", "--resolution", "0.5", "--no-rays", "--json"];
+        let build = [&["build", name, "-o", "again", "--json"][..], &HITS].concat();
         let summary: Value = serde_json::from_str(&voxtile(folder, &build).unwrap()).unwrap();
         let remarks = summary["remarks"].to_string();
         assert!(remarks.contains("coordinates are converted to metres: x and y times 0.3048"), "{remarks}");
@@ -82,7 +86,7 @@ fn contradictory_units_and_systems_are_refused() {
     }
     // The map names a system in metres.
     voxtile(folder, &["export", "map", "-o", "utm.laz", "--crs", "EPSG:25832"]).unwrap();
-    voxtile(folder, &["build", "utm.laz", "-o", "utm", "--resolution", "0.5", "--no-rays", "-q"]).unwrap();
+    voxtile(folder, &[&["build", "utm.laz", "-o", "utm", "-q"][..], &HITS].concat()).unwrap();
     let message = voxtile(folder, &["export", "utm", "-o", "a.laz", "--unit", "ft"]).unwrap_err();
     assert!(message.contains("the coordinate system of the map is in metres (EPSG:25832)"), "{message}");
     assert!(!folder.join("a.laz").exists());
