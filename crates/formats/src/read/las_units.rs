@@ -87,9 +87,10 @@ impl Units {
                 .push(format!("coordinates are converted to metres: x and y times {flat}, z times {high}"));
             // It describes the original coordinates, not those converted to metres.
             if let Some(crs) = units.crs.take() {
-                let code = epsg_code(&crs).map_or(String::new(), |code| format!(" (EPSG:{code})"));
+                let code = epsg_code(&crs).map_or(String::new(), |code| format!(": EPSG:{code}"));
                 units.remarks.push(format!(
-                    "the coordinate system{code} is not in metres and is not passed on; an export can name it with `crs`"
+                    "the coordinate system is not in metres and is not passed on; an export can name it with \
+                     `crs`{code}"
                 ));
             }
         }
