@@ -85,6 +85,14 @@ fn a_flush_without_scans_does_not_commit_records_of_a_killed_writer() {
     let found = verify(&*map, |finding| panic!("{finding}"), |_, _| ()).unwrap();
     assert_eq!(found.damage, 0);
     assert_eq!(scans_of(&map), expected(5));
+    // A damaged list remains as it is, as evidence for `repair`.
+    let cut = fs::read(map.join("scans.bin")).unwrap()[..100].to_vec();
+    fs::write(map.join("scans.bin"), &cut).unwrap();
+    snapshot(&*map, &SnapshotName::new("cut").unwrap()).unwrap();
+    assert_eq!(fs::read(map.join("scans.bin")).unwrap(), cut);
+    fs::remove_file(map.join("scans.bin")).unwrap();
+    snapshot(&*map, &SnapshotName::new("missing").unwrap()).unwrap();
+    assert!(!map.join("quarantine").exists());
 }
 
 /// Copies a folder with its subfolders.

@@ -133,7 +133,8 @@ impl ScanList {
             Some(EntryKind::File(bytes)) => bytes,
             _ => 0,
         };
-        if records.is_some_and(|records| Extent { records }.bytes() == file_bytes) {
+        // A file that is too short is damaged, and `repair` or the next scan deals with it.
+        if records.is_some_and(|records| file_bytes <= Extent { records }.bytes()) {
             return Ok(());
         }
         self.write(files, committed, records, 0).map(drop)
