@@ -67,11 +67,13 @@ if [[ ! -x $tools/bin/cargo-cyclonedx ]]; then
 fi
 export PATH=$tools/bin:$PATH
 
+# A folder of its own: cargo takes a crate of the same version from an earlier run for the same crate.
 # shellcheck disable=SC2046
-cargo package --locked $(tools/release/published.sh) "${dirty[@]}"
+CARGO_TARGET_DIR=$work/packages cargo package --locked $(tools/release/published.sh) "${dirty[@]}"
 for package in $(tools/release/published.sh); do
-    if [[ $package != --package ]]; then cp "$built/package/$package-$version.crate" "$work/out/"; fi
+    if [[ $package != --package ]]; then cp "$work/packages/package/$package-$version.crate" "$work/out/"; fi
 done
+rm -rf "$work/packages"
 
 . tools/release/deb.sh
 
