@@ -1,4 +1,5 @@
 mod clearing;
+mod layers;
 mod storage;
 
 use crate::error::{Error, Result};
@@ -7,6 +8,7 @@ use crate::sensor::SensorModel;
 use crate::space::{Grid, TileBox};
 pub(crate) use clearing::GUARD_REACH;
 pub use clearing::{Clearing, Guard};
+pub use layers::Layers;
 use serde::{Deserialize, Serialize};
 use std::fmt;
 pub use storage::Storage;
@@ -55,6 +57,9 @@ pub struct MapConfig {
     /// Whether the map keeps its scans, so that it can be remapped when poses change. A map that keeps scans continues
     /// to, regardless of this setting. Default: no.
     pub keeps_scans: bool,
+    /// What the map stores of the points that hit a voxel, besides their evidence. `None` selects the layers of the map,
+    /// and [`Layers::NONE`] for a new map.
+    pub layers: Option<Layers>,
 }
 
 /// Memory limit of an out-of-core mapper. It affects the duration of a build, but not the map.
@@ -172,6 +177,7 @@ impl Default for MapConfig {
             storage: Storage::default(),
             crs: None,
             keeps_scans: false,
+            layers: None,
         }
     }
 }
@@ -253,6 +259,16 @@ impl MapConfig {
     /// Sets whether the map keeps its scans.
     pub fn with_kept_scans(self, keeps_scans: bool) -> Self {
         Self { keeps_scans, ..self }
+    }
+
+    /// Sets the layers.
+    pub fn with_layers(self, layers: impl Into<Option<Layers>>) -> Self {
+        Self { layers: layers.into(), ..self }
+    }
+
+    /// Layers of the map.
+    pub fn layers(&self) -> Layers {
+        self.layers.unwrap_or(Layers::NONE)
     }
 
     /// Sets the insert mode.
@@ -359,6 +375,7 @@ impl MapConfig {
             let reason = format!("the coordinate reference system exceeds {MAX_CRS_BYTES} bytes");
             return Err(Error::argument("crs", reason));
         }
+        self.layers().validated()?;
         self.memory.check(&self.grid)?;
         if let OctreeConfig::Pointers(mode) = self.octree
             && let Some(cache) = mode.cache()

@@ -82,8 +82,8 @@ pub mod store;
 pub mod tile;
 
 pub use config::{
-    Clearing, Guard, InsertMode, MapConfig, MemoryLimit, OctreeConfig, RayConfig, Storage, VoxelCacheConfig,
-    VoxelCacheMode,
+    Clearing, Guard, InsertMode, Layers, MapConfig, MemoryLimit, OctreeConfig, RayConfig, Storage,
+    VoxelCacheConfig, VoxelCacheMode,
 };
 #[doc(hidden)]
 pub use error::beginning_or_difference;
@@ -97,8 +97,8 @@ pub use one_heap::begin_with_one_heap;
 pub use query::{
     Digest, Hit, MapQueries, Occupancy, Queries, RayQuery, Shape, United, UnknownAs, VoxelOccupancy,
 };
-pub use scan::{Pose, Scan, ScanPoints, ScanRef, ScanReport, Stop};
+pub use scan::{PointAttributes, Pose, Scan, ScanPoints, ScanRef, ScanReport, Stop};
 pub use sensor::{Evidence, SensorModel};
 pub use space::{Aabb, Grid, Point, TileBox, TileIndex, TileSelection, VoxelIndex};
 pub use store::{MapPath, SnapshotName};
-pub use tile::Voxel;
+pub use tile::{Voxel, VoxelLayers};

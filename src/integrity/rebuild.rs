@@ -409,6 +409,7 @@ fn identity(layout: &Layout, remains: &Salvage, trailers: &Trailers) -> Result<(
         inputs: Vec::new(),
         decayed_scan: 0,
         storage: layout.storage(),
+        layers: parameters.layers,
         crs: None,
         keeps_scans: false,
         catalog: None,

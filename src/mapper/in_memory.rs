@@ -158,7 +158,8 @@ impl Mapper for InMemoryMapper {
     }
 
     fn batch_update(&mut self, batch: &PointBatch<'_>) -> Result<ScanReport> {
-        let updates = batch.updates(&self.config.grid, &self.config.sensor_model)?;
+        let updates =
+            batch.updates_with_layers(&self.config.grid, &self.config.sensor_model, self.config.layers())?;
         Ok(self.accept(updates))
     }
 

@@ -2,7 +2,7 @@ use super::kept_scan::pose_numbers;
 use super::paging::{MemoryPlan, PagedTiles, TilePager};
 use super::trace_rules::trace_rules;
 use super::{LiveReader, MapStatistics, MapView, Mapper, TileRef};
-use crate::config::{Clearing, MapConfig, RayConfig};
+use crate::config::{Clearing, Layers, MapConfig, RayConfig};
 use crate::error::{Error, Result};
 use crate::persistence::{new_map_id, new_metadata};
 use crate::scan::{
@@ -75,7 +75,7 @@ impl OutOfCoreTileMapper {
     }
 
     /// Opens a map to continue it. Grid, sensor model and occupancy threshold of `config` must equal those of the map,
-    /// and so must the rule of clearing if `config` has one. [`MapReader::config_of`](super::MapReader::config_of)
+    /// and so must the rule of clearing and the layers if `config` has them. [`MapReader::config_of`](super::MapReader::config_of)
     /// reads them.
     ///
     /// # Errors
@@ -88,7 +88,12 @@ impl OutOfCoreTileMapper {
         let store = TileStore::open(disk, folder)?;
         check_parameters(folder, store.metadata(), &config)?;
         let own = store.metadata().ext.as_ref().and_then(|ext| ext.rays.clearing);
-        let config = config.with_storage(store.layout().storage()).with_clearing(own).validated()?;
+        let layers = store.metadata().ext.as_ref().map_or(Layers::NONE, |ext| ext.layers);
+        let config = config
+            .with_storage(store.layout().storage())
+            .with_clearing(own)
+            .with_layers(layers)
+            .validated()?;
         Ok(Self::new(config, store))
     }
 
@@ -554,7 +559,8 @@ impl Mapper for OutOfCoreTileMapper {
     }
 
     fn batch_update(&mut self, batch: &PointBatch<'_>) -> Result<ScanReport> {
-        let updates = batch.updates(&self.config.grid, &self.config.sensor_model)?;
+        let updates =
+            batch.updates_with_layers(&self.config.grid, &self.config.sensor_model, self.config.layers())?;
         let (report, _) = self.accept(updates, 0)?;
         self.pager().note_batch();
         Ok(report)
@@ -645,6 +651,12 @@ fn check_parameters(folder: &Path, metadata: &Metadata, config: &MapConfig) -> R
         && wanted != own
     {
         return Err(mismatch("rule of clearing", own.to_string(), wanted.to_string()));
+    }
+    let own = metadata.ext.as_ref().map_or(Layers::NONE, |ext| ext.layers);
+    if let Some(wanted) = config.layers
+        && wanted != own
+    {
+        return Err(mismatch("layers", own.to_string(), wanted.to_string()));
     }
     let Some(ext) = &metadata.ext else { return Ok(()) };
     if ext.sensor_model != config.sensor_model {

@@ -1,8 +1,8 @@
 use super::paging::MemoryPlan;
 use super::trace_rules::trace_rules;
-use crate::config::{MapConfig, RayConfig};
+use crate::config::{Layers, MapConfig, RayConfig};
 use crate::error::Result;
-use crate::scan::{Overflow, PackedUpdates, ScanPoints, ScanTracer, Stop};
+use crate::scan::{Overflow, PackedUpdates, ScanPoints, ScanTracer, Stop, TraceRules};
 use crate::space::TileIndex;
 use crate::store::Disk;
 use std::path::Path;
@@ -41,7 +41,8 @@ impl TileFinder {
             Ok(())
         };
         let overflow = Overflow { max_bytes, max_tiles: usize::MAX, folder, make_scratch, spill };
-        let updates = self.tracer.trace_points(trace_rules(&self.config, None), scan, Some(overflow))?;
+        let rules = TraceRules { layers: Layers::NONE, ..trace_rules(&self.config, None) };
+        let updates = self.tracer.trace_points(rules, scan, Some(overflow))?;
         self.tracer.stop().check()?;
         tiles.extend(updates.tiles.into_iter().map(|(tile, _)| tile));
         Ok(tiles)

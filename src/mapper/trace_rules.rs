@@ -12,5 +12,5 @@ pub(super) fn trace_rules<'a>(config: &'a MapConfig, tiles: Option<&'a TileSelec
         OctreeConfig::Pointers(_) => UpdateOrder::OfRays,
     };
     let mapped = MappedTiles { grid, selection: tiles };
-    TraceRules { mapped, model, rays, order }
+    TraceRules { mapped, model, rays, order, layers: config.layers() }
 }

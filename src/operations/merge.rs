@@ -41,7 +41,8 @@ pub struct Merged {
 ///
 /// The new map has its own id and no scans, unless the maps are regions of one build
 /// ([`RayConfig::region`](crate::RayConfig)) that together form a box: then the result equals one build of that box,
-/// and can be resumed. The map is created on the disk of the first map, and appears only when it is complete, see
+/// and can be resumed. The maps must have the same layers, which are combined like the evidence: added, or those of the
+/// preferred map. The map is created on the disk of the first map, and appears only when it is complete, see
 /// [`MapWriter`]. `progress` receives the number of tiles done and in total.
 ///
 /// # Errors
@@ -61,7 +62,7 @@ pub fn merge(
     if maps.iter().any(|map| map.config().rays.region != config.rays.region) {
         config.rays.region = None;
     }
-    maps.iter().try_for_each(|map| check_grid(map, first))?;
+    maps.iter().try_for_each(|map| check_grid(map, first).and_then(|()| check_layers(map, first)))?;
     config.crs = common_crs(maps)?;
     let rule = rule_for(maps, first, prefer)?;
     let one_build = OneBuild::of(maps)?;
@@ -199,6 +200,16 @@ pub(super) fn check_grid(map: &MapReader, first: &MapReader) -> Result<()> {
         }
     }
     Ok(())
+}
+
+/// Checks that a map has the layers of the first.
+pub(super) fn check_layers(map: &MapReader, first: &MapReader) -> Result<()> {
+    let (found, wanted) = (map.config().layers(), first.config().layers());
+    if found == wanted {
+        return Ok(());
+    }
+    let wanted = format!("{wanted} as {}", first.folder().display());
+    Err(Error::Mismatch { path: map.folder().to_owned(), what: "layers", found: found.to_string(), wanted })
 }
 
 /// Checks that evidence of a map can be added to that of the first.

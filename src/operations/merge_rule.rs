@@ -34,6 +34,19 @@ impl MergeRule {
         }
     }
 
+    /// Returns the position of the map whose evidence is taken among the maps that have observed a voxel; `None` if the
+    /// evidence of all is combined.
+    pub(super) fn chosen(self, known: &[Evidence]) -> Option<usize> {
+        match self {
+            Self::Add { .. } => None,
+            Self::Take(Prefer::First) => Some(0),
+            Self::Take(Prefer::Last) => known.len().checked_sub(1),
+            Self::Take(Prefer::MoreObserved) => (0..known.len()).reduce(|best, next| {
+                if known[next].observation_count > known[best].observation_count { next } else { best }
+            }),
+        }
+    }
+
     /// Combines the evidence of a voxel in the maps that have observed it, in their order. There is at least one.
     pub(super) fn evidence(self, known: &[Evidence]) -> Option<Evidence> {
         match self {
@@ -45,11 +58,7 @@ impl MergeRule {
                 })?;
                 Some(Evidence { log_odds: sum.log_odds.clamp(min, max), ..sum })
             }
-            Self::Take(Prefer::First) => known.first().copied(),
-            Self::Take(Prefer::Last) => known.last().copied(),
-            Self::Take(Prefer::MoreObserved) => known.iter().copied().reduce(|best, next| {
-                if next.observation_count > best.observation_count { next } else { best }
-            }),
+            Self::Take(_) => known.get(self.chosen(known)?).copied(),
         }
     }
 }

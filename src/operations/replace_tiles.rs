@@ -1,5 +1,5 @@
 use super::map_editor::{MapEditor, edit};
-use super::merge::{check_grid, check_model, common_crs, have_no_common_tile};
+use super::merge::{check_grid, check_layers, check_model, common_crs, have_no_common_tile};
 use crate::error::{Error, Result};
 use crate::mapper::{MapReader, MapView};
 use crate::sensor::Evidence;
@@ -47,6 +47,7 @@ pub fn replace_tiles(
     for part in parts {
         check_grid(part, &before)?;
         check_model(part, &before)?;
+        check_layers(part, &before)?;
     }
     common_crs(parts.iter().chain([&before]))?;
     if before.keeps_scans() {
@@ -107,10 +108,14 @@ fn replace_tile(
     editor.replace(tile, table)
 }
 
-/// Returns whether two tables have the same evidence, bit by bit.
+/// Returns whether two tables have the same evidence, bit by bit, and the same layers.
 fn is_same(a: &Table, b: &Table) -> bool {
     let bits = |(code, evidence): (MortonCode, Evidence)| {
         (code, evidence.log_odds.to_bits(), evidence.observation_count)
     };
-    a.iter().map(bits).eq(b.iter().map(bits))
+    let are_layers_same = match (a.layers(), b.layers()) {
+        (Some(a), Some(b)) => a.is_same(b),
+        (a, b) => a.is_none() && b.is_none(),
+    };
+    are_layers_same && a.iter().map(bits).eq(b.iter().map(bits))
 }

@@ -19,6 +19,7 @@ pub(super) fn voxels_of_part(table: &Table, tile: &VoxelBox, part: &VoxelPart) -
         run.extend(voxels.map(|(code, evidence)| (code.place_in_brick(), evidence)));
         kept.insert(brick, &run);
     }
+    keep_layers(&mut kept, table);
     kept
 }
 
@@ -31,5 +32,12 @@ pub(super) fn changed(table: &Table, mut change: impl FnMut(Evidence) -> Option<
         table.for_each_in(brick, |place, evidence| run.extend(change(evidence).map(|after| (place, after))));
         after.insert(brick, &run);
     }
+    keep_layers(&mut after, table);
     after
+}
+
+/// Gives the voxels of `kept` their layers in `before`.
+fn keep_layers(kept: &mut Table, before: &Table) {
+    let layers = before.layers().map(|layers| layers.filtered(|code| kept.get(code).is_some()));
+    kept.set_layers(layers);
 }

@@ -1,7 +1,7 @@
 use super::merge_rule::MergeRule;
 use crate::sensor::Evidence;
-use crate::space::{BRICK_VOXELS, BrickCode, BrickMask, add_to_mask, is_in_mask, places};
-use crate::tile::Table;
+use crate::space::{BRICK_VOXELS, BrickCode, BrickMask, MortonCode, add_to_mask, is_in_mask, places};
+use crate::tile::{LayerTable, Table};
 use std::collections::BTreeSet;
 
 /// Merges the tables of a tile in several maps. Its buffers are reused: 8 KiB per map.
@@ -38,7 +38,31 @@ impl TableMerge {
             self.merge_brick(code, tables);
             merged.insert(code, &self.run);
         }
+        merged.set_layers(self.merged_layers(tables));
         merged
+    }
+
+    /// Layers of a voxel are combined as its evidence: added, or taken from the map whose evidence is taken.
+    fn merged_layers(&self, tables: &[&Table]) -> Option<LayerTable> {
+        let layers = tables.iter().find_map(|table| table.layers())?.layers();
+        let mut merged = LayerTable::new(layers);
+        for (number, table) in tables.iter().enumerate() {
+            let Some(layers) = table.layers() else { continue };
+            match self.rule {
+                MergeRule::Add { .. } => merged.merge(layers),
+                MergeRule::Take(_) => {
+                    merged.merge(&layers.filtered(|voxel| self.map_of(tables, voxel) == Some(number)));
+                }
+            }
+        }
+        Some(merged)
+    }
+
+    /// Number of the map whose evidence of a voxel is taken.
+    fn map_of(&self, tables: &[&Table], voxel: MortonCode) -> Option<usize> {
+        let known = tables.iter().enumerate().filter_map(|(number, table)| Some((number, table.get(voxel)?)));
+        let (numbers, known): (Vec<usize>, Vec<Evidence>) = known.unzip();
+        numbers.get(self.rule.chosen(&known)?).copied()
     }
 
     fn merge_brick(&mut self, code: BrickCode, tables: &[&Table]) {

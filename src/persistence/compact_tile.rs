@@ -1,14 +1,16 @@
 use super::packer::Packer;
-use crate::error::Result;
+use crate::error::{DecodeError, Result};
 use crate::space::{Grid, TileIndex};
-use crate::tile::format::read_compact;
+use crate::tile::format::{read_compact, read_layer_section};
 use crate::tile::{Table, Tile};
 use std::sync::Arc;
 
 /// Tile in the compact form, with the counts that are needed without decoding.
 #[derive(Clone, Debug)]
 pub(crate) struct CompactTile {
+    /// The table, then the layers.
     bytes: Arc<[u8]>,
+    layer_bytes: usize,
     voxels: u64,
     /// Number of occupied voxels, if the map stores tiles in the compact form.
     occupied: Option<u64>,
@@ -25,8 +27,12 @@ impl CompactTile {
     /// Out of memory.
     pub(crate) fn encode(packer: &mut Packer, tile: &Tile, occupied_from: Option<f64>) -> Result<Self> {
         let table = tile.table();
+        let mut bytes = packer.pack(table)?;
+        let layers = packer.pack_layers(table)?;
+        bytes.extend_from_slice(&layers);
         Ok(Self {
-            bytes: packer.pack(table)?.into(),
+            bytes: bytes.into(),
+            layer_bytes: layers.len(),
             voxels: table.len() as u64,
             occupied: occupied_from.map(|log_odds| table.count_from(log_odds) as u64),
             table_bytes: table.bytes(),
@@ -39,8 +45,21 @@ impl CompactTile {
     ///
     /// [`Damaged`](crate::Error::Damaged) if the bytes in memory changed.
     pub(crate) fn decode(&self, grid: &Grid, index: TileIndex) -> Result<Table> {
-        read_compact(&mut &*self.bytes, self.bytes.len() as u64, &grid.voxels_of_tile(index))
-            .map_err(|error| error.in_map("memory".as_ref(), Some(index)))
+        let voxels = grid.voxels_of_tile(index);
+        let (table, layers) = self.parts();
+        let decode = || {
+            let mut table = read_compact(&mut { table }, table.len() as u64, &voxels)?;
+            if !layers.is_empty() {
+                table.set_layers(Some(read_layer_section(&mut { layers }, layers.len() as u64, &voxels)?));
+            }
+            Ok(table)
+        };
+        decode().map_err(|error: DecodeError| error.in_map("memory".as_ref(), Some(index)))
+    }
+
+    /// Table and section of layers, which is empty if there are none.
+    pub(crate) fn parts(&self) -> (&[u8], &[u8]) {
+        self.bytes.split_at(self.bytes.len() - self.layer_bytes)
     }
 
     pub(crate) fn bytes(&self) -> &[u8] {

@@ -14,11 +14,26 @@ impl Packer {
     ///
     /// Out of memory.
     pub(crate) fn pack(&mut self, table: &Table) -> Result<Vec<u8>> {
-        let failed = |error| Error::io("memory".as_ref(), "pack a tile in", error);
-        let writer = match &mut self.0 {
-            Some(writer) => writer,
-            none => none.insert(CompactWriter::new(CompactEffort::Fast).map_err(failed)?),
-        };
-        writer.bytes(table).map_err(failed)
+        self.writer()?.bytes(table).map_err(failed)
     }
+
+    /// Encodes the layers of a table; empty if it has none.
+    ///
+    /// # Errors
+    ///
+    /// Out of memory.
+    pub(crate) fn pack_layers(&mut self, table: &Table) -> Result<Vec<u8>> {
+        self.writer()?.layer_section(table).map_err(failed)
+    }
+
+    fn writer(&mut self) -> Result<&mut CompactWriter> {
+        match &mut self.0 {
+            Some(writer) => Ok(writer),
+            none => Ok(none.insert(CompactWriter::new(CompactEffort::Fast).map_err(failed)?)),
+        }
+    }
+}
+
+fn failed(error: std::io::Error) -> Error {
+    Error::io("memory".as_ref(), "pack a tile in", error)
 }

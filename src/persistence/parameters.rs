@@ -18,6 +18,7 @@ pub(crate) fn new_metadata(config: &MapConfig, map_id: [u8; 16], inputs: &[Input
         inputs: inputs.to_vec(),
         decayed_scan: 0,
         storage: config.storage,
+        layers: config.layers(),
         crs: config.crs.clone(),
         keeps_scans: config.keeps_scans,
         catalog: None,
@@ -43,6 +44,7 @@ pub(crate) fn config_from(metadata: &Metadata, path: &Path) -> Result<MapConfig>
         config.rays = ext.rays;
         config.keeps_scans = ext.keeps_scans;
         config.crs.clone_from(&ext.crs);
+        config.layers = Some(ext.layers);
     }
     config.validated().map_err(|error| wrong(error.to_string()))
 }
@@ -55,5 +57,6 @@ pub(crate) fn map_parameters(config: &MapConfig) -> MapParameters {
         sensor_model: config.sensor_model,
         occupancy_threshold: config.occupancy_threshold,
         clearing: config.rays.stored().clearing,
+        layers: config.layers(),
     }
 }

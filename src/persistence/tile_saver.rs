@@ -51,11 +51,14 @@ impl TileSaver {
         scan_number: u64,
     ) -> Result<TileVersion> {
         match writer.storage() {
-            Storage::OctoMap => self.write_octomap(writer, index, table, scan_number),
+            Storage::OctoMap => {
+                let layers = self.packer.pack_layers(table)?;
+                self.write_octomap(writer, index, (table, &layers), scan_number)
+            }
             Storage::Compact => {
-                let compact = self.packer.pack(table)?;
+                let (compact, layers) = (self.packer.pack(table)?, self.packer.pack_layers(table)?);
                 let (voxels, occupied) = (table.len() as u64, table.count_from(self.threshold) as u64);
-                self.write_encoded(writer, index, &compact, [voxels, occupied], scan_number)
+                self.write_encoded(writer, index, (&compact, &layers), [voxels, occupied], scan_number)
             }
         }
     }
@@ -71,9 +74,12 @@ impl TileSaver {
     ) -> Result<TileVersion> {
         match tile.occupied() {
             Some(occupied) => {
-                self.write_encoded(writer, index, tile.bytes(), [tile.voxels(), occupied], scan_number)
+                self.write_encoded(writer, index, tile.parts(), [tile.voxels(), occupied], scan_number)
             }
-            None => self.write_octomap(writer, index, &tile.decode(grid, index)?, scan_number),
+            None => {
+                let (_, layers) = tile.parts();
+                self.write_octomap(writer, index, (&tile.decode(grid, index)?, layers), scan_number)
+            }
         }
     }
 
@@ -81,13 +87,14 @@ impl TileSaver {
         &self,
         writer: &TileWriter,
         index: TileIndex,
-        compact: &[u8],
+        (compact, layers): (&[u8], &[u8]),
         [voxels, occupied]: [u64; 2],
         scan_number: u64,
     ) -> Result<TileVersion> {
         let front = self.trailer(writer, index, scan_number, FileChecksum::default());
-        let table = writer
-            .write_next(index, TileFile::Table, |mut out| write_compact_file(compact, front, &mut out))?;
+        let table = writer.write_next(index, TileFile::Table, |mut out| {
+            write_compact_file(compact, layers, front, &mut out)
+        })?;
         Ok(TileVersion { scan_number, table, octree: FileChecksum::default(), voxels, occupied })
     }
 
@@ -96,7 +103,7 @@ impl TileSaver {
         &self,
         writer: &TileWriter,
         index: TileIndex,
-        table: &Table,
+        (table, layers): (&Table, &[u8]),
         scan_number: u64,
     ) -> Result<TileVersion> {
         let (voxels, occupied) = (table.len() as u64, table.count_from(self.threshold) as u64);
@@ -104,8 +111,9 @@ impl TileSaver {
             table.write_bt(self.resolution_m, self.threshold as f32, &mut out)
         })?;
         let trailer = self.trailer(writer, index, scan_number, octree);
-        let table = writer
-            .write_next(index, TileFile::Table, |mut out| write_table(table, trailer, &mut out).map(drop))?;
+        let table = writer.write_next(index, TileFile::Table, |mut out| {
+            write_table(table, layers, trailer, &mut out).map(drop)
+        })?;
         Ok(TileVersion { scan_number, table, octree, voxels, occupied })
     }
 

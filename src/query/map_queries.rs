@@ -6,7 +6,7 @@ use crate::mapper::MapView;
 use crate::octree::Octree;
 use crate::sensor::Evidence;
 use crate::space::{Aabb, Point};
-use crate::tile::Voxel;
+use crate::tile::{Voxel, VoxelLayers};
 use std::io::{self, Read, Seek, Write};
 
 /// Additional queries of maps of tiles, beyond [`Queries`](super::Queries): exact evidence, coarse nodes, the whole
@@ -113,6 +113,27 @@ pub trait MapQueries: MapView + Sized {
     /// Fails if a tile cannot be read.
     fn digest(&self) -> Result<Digest> {
         digest::digest(self)
+    }
+
+    /// Returns the digest of the map's layers: equal for equal layers, however they were built. See `docs/format.md`.
+    ///
+    /// # Errors
+    ///
+    /// Fails if a tile cannot be read.
+    fn layer_digest(&self) -> Result<Digest> {
+        digest::layer_digest(self)
+    }
+
+    /// Returns what the map's layers store of the points that hit the voxel that contains a point; `None` if no point
+    /// hit it, and in a map without layers.
+    ///
+    /// # Errors
+    ///
+    /// Same errors as [`MapQueries::voxel_at`].
+    fn layers_at(&self, point: Point) -> Result<Option<VoxelLayers>> {
+        let grid = &self.config().grid;
+        let Some(voxel) = grid.voxel_of(point) else { return Ok(None) };
+        Ok(self.tile(grid.tile_of_voxel(voxel))?.and_then(|tile| tile.layers_of(voxel)))
     }
 
     /// Returns one octree of the whole map or of a region, as in OctoMap, in memory. For larger maps use

@@ -18,6 +18,7 @@ mod moving_marks;
 mod pages;
 mod per_ray;
 mod per_scan;
+mod point_attributes;
 mod point_batch;
 mod pose;
 mod ray;
@@ -38,13 +39,14 @@ pub(crate) use codec::{MAX_BLOCK_BYTES, PointDecoder};
 pub use coordinate::Coordinate;
 pub(crate) use moving_marks::ChunkMarks;
 pub use moving_marks::{MovingMarks, MovingMarksBuilder};
+pub use point_attributes::{AttributeSet, AttributeSlices, PointAttributes};
 pub use point_batch::PointBatch;
 pub(crate) use point_batch::updates_of_hits;
 pub use pose::Pose;
 pub(crate) use ray::Advanced;
 pub use ray::{MAX_RAY_STEPS, RayWalk, is_hit, no_return};
 pub use report::{ScanReport, SkippedPoints};
-pub use scan_points::{ScanPoints, TakePoints};
+pub use scan_points::{PointFrame, ScanPoints, TakeAttributed, TakePoints};
 pub use scan_ref::ScanRef;
 pub(crate) use spill::Overflow;
 pub use stop::Stop;
@@ -52,6 +54,7 @@ pub use trace::ScanTracer;
 pub(crate) use trace::{TraceRules, UpdateOrder};
 pub(crate) use updates::MappedTiles;
 pub use updates::{
-    BrickRuns, BrickUpdate, Misses, OrderedUpdates, PackedUpdates, Run, ScanUpdates, TileRuns, TileUpdates,
+    BrickRuns, BrickUpdate, LayerHit, LayerHits, Misses, OFFSETS_PER_VOXEL, OrderedUpdates, PackedUpdates,
+    Run, ScanUpdates, TileRuns, TileUpdates,
 };
 pub use world_scan::Scan;

@@ -1,9 +1,9 @@
 use super::per_ray::OrderedCollector;
 use super::spill::{Overflow, ScanParts};
-use super::trace::check_intensities;
+use super::trace::{HitsByTile, check_intensities};
 use super::updates::MappedTiles;
-use super::{ChunkMarks, ScanPoints, ScanReport, ScanUpdates, Stop};
-use crate::config::MapConfig;
+use super::{ChunkMarks, LayerHit, PointFrame, ScanPoints, ScanReport, ScanUpdates, Stop};
+use crate::config::{Layers, MapConfig};
 use crate::error::{Error, Result};
 use crate::sensor::{Observation, SensorModel};
 use crate::space::{Grid, Point, TileBox};
@@ -26,6 +26,16 @@ impl PointBatch<'_> {
     ///
     /// Fails if the lists differ in length, or if intensities are missing that the sensor model needs.
     pub fn updates(&self, grid: &Grid, model: &SensorModel) -> Result<ScanUpdates> {
+        self.updates_with_layers(grid, model, Layers::NONE)
+    }
+
+    /// Like [`PointBatch::updates`], with the hits for the layers.
+    pub(crate) fn updates_with_layers(
+        &self,
+        grid: &Grid,
+        model: &SensorModel,
+        layers: Layers,
+    ) -> Result<ScanUpdates> {
         check_intensities(model, self.points.len(), self.intensities)?;
         if self.is_occupied.len() != self.points.len() {
             let reason = format!(
@@ -35,11 +45,15 @@ impl PointBatch<'_> {
             );
             return Err(Error::argument("is_occupied", reason));
         }
-        let mut collector = BatchCollector::new(grid, model, self.points.len());
+        let mut collector = BatchCollector::new(grid, model, layers, self.points.len(), None);
         for (number, (&point, &is_occupied)) in self.points.iter().zip(self.is_occupied).enumerate() {
             let intensity = self.intensities.map_or(0.0, |intensities| intensities[number]);
             let observation = if is_occupied { Observation::Hit(intensity) } else { Observation::Miss };
-            collector.take(point, intensity, observation);
+            let of_layers = Attributes {
+                intensity: self.intensities.map_or(f32::NAN, |intensities| intensities[number]),
+                ..Attributes::NONE
+            };
+            collector.take(point, intensity, observation, &of_layers);
         }
         Ok(collector.into_updates())
     }
@@ -63,10 +77,10 @@ pub(crate) fn updates_of_hits(
     if !scan.has_intensities() {
         check_intensities(model, scan.len(), None)?;
     }
-    let mut collector = BatchCollector::new(grid, model, scan.len());
+    let mut collector = BatchCollector::new(grid, model, config.layers(), scan.len(), scan.stamp_ns());
     let Some(mut overflow) = overflow else {
-        for_each_hit(scan, stop, |point, intensity| {
-            collector.take_within(rays.region, point, intensity);
+        for_each_hit(scan, stop, |point, intensity, attributes| {
+            collector.take_within(rays.region, point, intensity, attributes);
             true
         })?;
         return Ok(collector.into_updates());
@@ -74,33 +88,68 @@ pub(crate) fn updates_of_hits(
     let Overflow { max_bytes, max_tiles, make_scratch, .. } = overflow;
     let mapped = MappedTiles { grid, selection: None };
     let parts = ScanParts::new(mapped, None, stop, max_bytes / 4, max_tiles, make_scratch);
-    for_each_hit(scan, stop, |point, intensity| {
-        collector.take_within(rays.region, point, intensity);
+    let mut failure = None;
+    for_each_hit(scan, stop, |point, intensity, attributes| {
+        collector.take_within(rays.region, point, intensity, attributes);
         if collector.updates.bytes() > max_bytes / 2 {
             collector.updates.drain_to(&parts);
         }
-        !parts.has_failed()
+        if collector.hit_bytes() > max_bytes / 4 {
+            failure = (overflow.spill)(collector.take_hits().into_packed()).err();
+        }
+        !parts.has_failed() && failure.is_none()
     })?;
+    if let Some(error) = failure {
+        return Err(error);
+    }
     if parts.is_empty() {
         return Ok(collector.into_updates());
     }
     collector.updates.drain_to(&parts);
-    parts.into_updates(collector.report, false, stop, &mut overflow)
+    let mut updates = parts.into_updates(collector.report, false, stop, &mut overflow)?;
+    collector.hits.add_to(&mut updates);
+    Ok(updates)
 }
 
-/// Passes points that are not marked as moving with their intensities (0 if they have none), until `take` returns
-/// false.
-fn for_each_hit(scan: &dyn ScanPoints, stop: &Stop, mut take: impl FnMut(Point, f32) -> bool) -> Result<()> {
+/// Attributes of a point for the layers.
+struct Attributes {
+    /// NaN if the point has none.
+    intensity: f32,
+    colour: Option<[u8; 3]>,
+    class: Option<u8>,
+}
+
+impl Attributes {
+    const NONE: Self = Self { intensity: f32::NAN, colour: None, class: None };
+}
+
+/// Passes points that are not marked as moving with their intensities (0 if they have none) and attributes, until `take`
+/// returns false.
+fn for_each_hit(
+    scan: &dyn ScanPoints,
+    stop: &Stop,
+    mut take: impl FnMut(Point, f32, &Attributes) -> bool,
+) -> Result<()> {
     let mut marks = ChunkMarks::from(scan.moving(), 0);
-    scan.for_each_chunk(0..scan.len(), &mut |points, intensities| {
-        let is_moving = marks.next(points.len());
-        let intensity = |number: usize| intensities.map_or(0.0, |intensities| intensities[number]);
-        let mut numbered = points.iter().enumerate();
-        let goes_on = numbered.all(|(number, &point)| {
-            is_moving.get(number).is_some_and(|is_moving| *is_moving) || take(point, intensity(number))
-        });
-        goes_on && !stop.is_set()
-    })?;
+    scan.for_each_attributed_chunk(
+        0..scan.len(),
+        PointFrame::World,
+        &mut |points, intensities, attributes| {
+            let is_moving = marks.next(points.len());
+            let mut numbered = points.iter().enumerate();
+            let goes_on = numbered.all(|(number, &point)| {
+                let intensity = intensities.map(|intensities| intensities[number]);
+                let of_point = Attributes {
+                    intensity: intensity.unwrap_or(f32::NAN),
+                    colour: attributes.colour(number),
+                    class: attributes.class(number),
+                };
+                is_moving.get(number).is_some_and(|is_moving| *is_moving)
+                    || take(point, intensity.unwrap_or(0.0), &of_point)
+            });
+            goes_on && !stop.is_set()
+        },
+    )?;
     stop.check()
 }
 
@@ -109,17 +158,28 @@ struct BatchCollector<'a> {
     grid: &'a Grid,
     model: &'a SensorModel,
     updates: OrderedCollector<'a>,
+    layers: Layers,
+    stamp_ns: Option<i64>,
+    hits: HitsByTile<'a>,
     report: ScanReport,
 }
 
 impl<'a> BatchCollector<'a> {
-    fn new(grid: &'a Grid, model: &'a SensorModel, points: usize) -> Self {
+    fn new(
+        grid: &'a Grid,
+        model: &'a SensorModel,
+        layers: Layers,
+        points: usize,
+        stamp_ns: Option<i64>,
+    ) -> Self {
         let mapped = MappedTiles { grid, selection: None };
         let updates = OrderedCollector::new(mapped, model.needs_intensity());
-        Self { grid, model, updates, report: ScanReport { points: points as u64, ..ScanReport::default() } }
+        let hits = HitsByTile::new(mapped, layers, stamp_ns);
+        let report = ScanReport { points: points as u64, ..ScanReport::default() };
+        Self { grid, model, updates, layers, stamp_ns, hits, report }
     }
 
-    fn take(&mut self, point: Point, intensity: f32, observation: Observation) {
+    fn take(&mut self, point: Point, intensity: f32, observation: Observation, of_layers: &Attributes) {
         if self.model.needs_intensity() && intensity.is_nan() {
             self.report.skipped.no_intensity += 1;
         } else if !point.iter().all(|coordinate| coordinate.is_finite()) {
@@ -127,6 +187,14 @@ impl<'a> BatchCollector<'a> {
         } else if let Some(voxel) = self.grid.voxel_of(point) {
             if self.model.is_evidence(observation) {
                 self.updates.push(voxel, observation);
+                if !self.layers.is_none() && matches!(observation, Observation::Hit(_)) {
+                    self.hits.push(self.grid.to_voxel_units(point), voxel, |layers| LayerHit {
+                        intensity: layers.stored_intensity(of_layers.intensity),
+                        colour: of_layers.colour.filter(|_| layers.colour),
+                        class: of_layers.class.filter(|_| layers.class),
+                        ..LayerHit::default()
+                    });
+                }
             }
         } else {
             self.report.skipped.out_of_range += 1;
@@ -134,16 +202,29 @@ impl<'a> BatchCollector<'a> {
     }
 
     /// Adds a hit unless it is outside of `region`. A point outside of the map's space is skipped and counted.
-    fn take_within(&mut self, region: Option<TileBox>, point: Point, intensity: f32) {
+    fn take_within(&mut self, region: Option<TileBox>, point: Point, intensity: f32, of_layers: &Attributes) {
         let is_outside =
             region.zip(self.grid.tile_of(point)).is_some_and(|(region, tile)| !region.contains(tile));
         if !is_outside {
-            self.take(point, intensity, Observation::Hit(intensity));
+            self.take(point, intensity, Observation::Hit(intensity), of_layers);
         }
     }
 
+    /// Bytes of memory of the hits for the layers.
+    fn hit_bytes(&self) -> usize {
+        self.hits.bytes()
+    }
+
+    /// Takes the hits for the layers.
+    fn take_hits(&mut self) -> HitsByTile<'a> {
+        let mapped = MappedTiles { grid: self.grid, selection: None };
+        std::mem::replace(&mut self.hits, HitsByTile::new(mapped, self.layers, self.stamp_ns))
+    }
+
     fn into_updates(self) -> ScanUpdates {
-        self.updates.into_updates(self.report)
+        let mut updates = self.updates.into_updates(self.report);
+        self.hits.add_to(&mut updates);
+        updates
     }
 }
 

@@ -1,4 +1,4 @@
-use super::{MovingMarks, Pose, Scan, ScanRef};
+use super::{AttributeSet, AttributeSlices, MovingMarks, Pose, Scan, ScanRef};
 use crate::error::Result;
 use crate::space::Point;
 use std::ops::Range;
@@ -6,6 +6,19 @@ use std::ops::Range;
 /// Callback that receives a chunk of a scan's points, in metres, with their intensities if they have any. Returns
 /// whether to continue.
 pub type TakePoints<'a> = dyn FnMut(&[Point], Option<&[f32]>) -> bool + 'a;
+
+/// Callback that receives a chunk of a scan's points, in metres, with their intensities if they have any, and their
+/// attributes. Returns whether to continue.
+pub type TakeAttributed<'a> = dyn FnMut(&[Point], Option<&[f32]>, AttributeSlices<'_>) -> bool + 'a;
+
+/// Frame in which points are passed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum PointFrame {
+    /// The world frame.
+    World,
+    /// The sensor frame if the scan has points in it, else the world frame.
+    Own,
+}
 
 /// Points of a scan, in memory or in a file that may exceed memory, and the position of the sensor.
 pub trait ScanPoints: Sync {
@@ -55,6 +68,45 @@ pub trait ScanPoints: Sync {
     /// ray passes free voxels.
     fn moving(&self) -> Option<&MovingMarks> {
         None
+    }
+
+    /// Which attributes the points have, besides intensities.
+    fn attributes(&self) -> AttributeSet {
+        AttributeSet::NONE
+    }
+
+    /// Like [`ScanPoints::for_each_chunk`], with the points' attributes, in the world frame or as
+    /// [`ScanPoints::for_each_own_chunk`] passes them.
+    ///
+    /// # Errors
+    ///
+    /// Same errors as [`ScanPoints::for_each_chunk`].
+    fn for_each_attributed_chunk(
+        &self,
+        range: Range<usize>,
+        frame: PointFrame,
+        take: &mut TakeAttributed<'_>,
+    ) -> Result<()> {
+        self.for_each_chunk_in(frame, range, &mut |points, intensities| {
+            take(points, intensities, AttributeSlices::default())
+        })
+    }
+
+    /// Passes the points in either frame: [`ScanPoints::for_each_chunk`] or [`ScanPoints::for_each_own_chunk`].
+    ///
+    /// # Errors
+    ///
+    /// Same errors as [`ScanPoints::for_each_chunk`].
+    fn for_each_chunk_in(
+        &self,
+        frame: PointFrame,
+        range: Range<usize>,
+        take: &mut TakePoints<'_>,
+    ) -> Result<()> {
+        match frame {
+            PointFrame::World => self.for_each_chunk(range, take),
+            PointFrame::Own => self.for_each_own_chunk(range, take),
+        }
     }
 
     /// All points, if they are in memory in the form that [`ScanPoints::for_each_chunk`] passes.

@@ -1,7 +1,9 @@
 use super::coordinate::Coordinate;
 use super::coordinate::sealed::PointSlice;
 use super::trace::check_count;
-use super::{MovingMarks, Pose, ScanPoints, TakePoints};
+use super::{
+    AttributeSet, MovingMarks, PointAttributes, PointFrame, Pose, ScanPoints, TakeAttributed, TakePoints,
+};
 use crate::error::{Error, Result};
 use crate::space::Point;
 use std::ops::Range;
@@ -37,6 +39,7 @@ pub struct ScanRef<'a> {
     points: PointSlice<'a>,
     /// One per point.
     intensities: Option<&'a [f32]>,
+    attributes: Option<&'a PointAttributes>,
     moving: Option<&'a MovingMarks>,
     stamp_ns: Option<i64>,
 }
@@ -66,7 +69,7 @@ impl<'a> ScanRef<'a> {
     }
 
     fn new(frame: Frame, points: PointSlice<'a>) -> Self {
-        Self { frame, points, intensities: None, moving: None, stamp_ns: None }
+        Self { frame, points, intensities: None, attributes: None, moving: None, stamp_ns: None }
     }
 
     /// Adds an intensity per point.
@@ -77,6 +80,16 @@ impl<'a> ScanRef<'a> {
     pub fn with_intensities(self, intensities: &'a [f32]) -> Result<Self> {
         check_count(self.len(), intensities)?;
         Ok(Self { intensities: Some(intensities), ..self })
+    }
+
+    /// Adds colours or classes, for the layers of a map.
+    ///
+    /// # Errors
+    ///
+    /// Fails if the number of entries differs from that of the points.
+    pub fn with_attributes(self, attributes: &'a PointAttributes) -> Result<Self> {
+        attributes.check_count(self.len())?;
+        Ok(Self { attributes: Some(attributes), ..self })
     }
 
     /// Marks the points that hit something that was moving: they are no hits, but their rays pass free voxels.
@@ -124,6 +137,25 @@ impl ScanPoints for ScanRef<'_> {
 
     fn moving(&self) -> Option<&MovingMarks> {
         self.moving
+    }
+
+    fn attributes(&self) -> AttributeSet {
+        self.attributes.map_or(AttributeSet::NONE, PointAttributes::set)
+    }
+
+    fn for_each_attributed_chunk(
+        &self,
+        range: Range<usize>,
+        frame: PointFrame,
+        take: &mut TakeAttributed<'_>,
+    ) -> Result<()> {
+        let mut first = range.start;
+        self.for_each_chunk_in(frame, range, &mut |points, intensities| {
+            let of_chunk = first..first + points.len();
+            first = of_chunk.end;
+            let attributes = self.attributes.map(|attributes| attributes.part(of_chunk));
+            take(points, intensities, attributes.unwrap_or_default())
+        })
     }
 
     fn for_each_chunk(&self, range: Range<usize>, take: &mut TakePoints<'_>) -> Result<()> {

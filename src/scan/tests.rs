@@ -84,7 +84,7 @@ impl Setting {
         let mapped = MappedTiles { grid, selection: tiles.as_ref() };
         let tracer = &mut ScanTracer::default();
         let updates =
-            tracer.trace_points(TraceRules { mapped, model, rays, order: *order }, scan, None).unwrap();
+            tracer.trace_points(TraceRules::of_evidence(mapped, model, rays, *order), scan, None).unwrap();
         let mut by_voxel = UpdatesByVoxel::new();
         updates.tiles.iter().for_each(|(tile, updates)| add(&mut by_voxel, grid, *tile, updates));
         (by_voxel, updates.report)
@@ -110,8 +110,11 @@ impl Setting {
         let make_scratch = &|| Ok(Box::new(Vec::new()) as Box<dyn Scratch>);
         let folder = Path::new("map");
         let overflow = Overflow { max_bytes, max_tiles: usize::MAX, folder, make_scratch, spill: &mut spill };
-        let ScanUpdates { tiles, report } =
-            tracer.trace_points(TraceRules { mapped, model, rays, order: *order }, scan, Some(overflow))?;
+        let ScanUpdates { tiles, report } = tracer.trace_points(
+            TraceRules::of_evidence(mapped, model, rays, *order),
+            scan,
+            Some(overflow),
+        )?;
         tiles.iter().for_each(|(tile, updates)| add(&mut by_voxel, grid, *tile, updates));
         Ok((by_voxel, report, times))
     }
@@ -176,7 +179,7 @@ fn concurrent_scans_give_the_same_updates_and_large_ones_are_rejected() {
     let references: Vec<&dyn ScanPoints> = scans.iter().map(|scan| scan as _).collect();
     for setting in settings(10.0) {
         let Setting { grid, model, rays, order, .. } = &setting;
-        let rules = TraceRules { mapped: MappedTiles { grid, selection: None }, model, rays, order: *order };
+        let rules = TraceRules::of_evidence(MappedTiles { grid, selection: None }, model, rays, *order);
         let limited = rays.insert_mode == InsertMode::PerScan;
         let alone: Vec<_> = scans.iter().map(|scan| setting.whole(scan)).collect();
         for (threads, bytes) in [(1, None), (2, None), (12, None), (3, Some(512 << 20)), (3, Some(16 << 20))]
@@ -228,7 +231,7 @@ fn a_failed_scratch_file_is_an_error_with_the_folder() {
         let overflow = Overflow { max_bytes: 1 << 16, max_tiles: usize::MAX, folder, make_scratch, spill };
         let mut tracer = ScanTracer::with_memory_bytes(1 << 20);
         let mapped = MappedTiles { grid, selection: None };
-        let rules = TraceRules { mapped, model, rays, order: *order };
+        let rules = TraceRules::of_evidence(mapped, model, rays, *order);
         let traced = tracer.trace_points(rules, &scan, Some(overflow));
         assert!(traced.unwrap_err().to_string().contains("some_map"));
     }

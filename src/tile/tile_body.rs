@@ -1,4 +1,5 @@
 use super::OctreeFactory;
+use super::layers::VoxelLayers;
 use super::octocache::VoxelCacheCounts;
 use super::octree::{BrickOctree, TileOctree};
 use super::table::Table;
@@ -118,6 +119,13 @@ impl Tile {
     /// voxel; `None` if all are unknown. At depth 16, [`Tile::evidence`] returns the value without rounding.
     pub fn max_log_odds_under(&self, voxel: VoxelIndex, depth: u8) -> Option<f32> {
         self.octree.max_under(&self.table, VoxelKey::from_index(voxel).morton(), depth)
+    }
+
+    /// What the map's layers store of the points that hit a voxel of this tile; `None` without a hit, without layers,
+    /// and for voxels of other tiles.
+    pub fn layers_of(&self, voxel: VoxelIndex) -> Option<VoxelLayers> {
+        let is_own = self.voxels.contains(voxel);
+        is_own.then(|| self.table.layers_of(VoxelKey::from_index(voxel).morton()))?
     }
 
     /// The observed voxels in Morton order.

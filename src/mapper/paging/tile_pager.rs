@@ -51,6 +51,7 @@ const BYTES_OF_NEW_TILES: usize = 4 << 20;
 fn bytes_of_new_tile(updates: &TileUpdates) -> usize {
     const TILE: usize = 2 << 10;
     const BRICK: usize = 384;
+    const BYTES_OF_HIT: usize = 16;
     TILE + match updates {
         TileUpdates::Masks(bricks) => BRICK * bricks.len(),
         TileUpdates::Runs(runs) => BRICK * runs.brick_count(),
@@ -58,6 +59,8 @@ fn bytes_of_new_tile(updates: &TileUpdates) -> usize {
         // their voxels.
         TileUpdates::Packed(packed) => BRICK / 25 * packed.bytes(),
         TileUpdates::Ordered(updates) => 8 * updates.len(),
+        TileUpdates::Layers(hits) => BYTES_OF_HIT * hits.len(),
+        TileUpdates::WithLayers(updates, hits) => bytes_of_new_tile(updates) + BYTES_OF_HIT * hits.len(),
     }
 }
 

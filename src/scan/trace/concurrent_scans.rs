@@ -1,3 +1,4 @@
+use super::scan_hits::BYTES_PER_POINT;
 use super::scan_rays::{PerScanUpdates, ScanRays};
 use super::scan_tracer::{ScanTracer, TraceRules};
 use crate::config::InsertMode;
@@ -70,7 +71,12 @@ impl ScanTracer {
         max_threads: usize,
     ) -> Result<Option<ScanUpdates>> {
         let scan_rays = ScanRays::new(rules, traced, scan, max_threads, &self.stop)?;
-        let updates = match (rules.rays.insert_mode, self.limit.is_none()) {
+        if !rules.layers.is_none()
+            && !self.limit.has_room_for_bytes(scan.len().saturating_mul(BYTES_PER_POINT))
+        {
+            return Ok(None);
+        }
+        let mut updates = match (rules.rays.insert_mode, self.limit.is_none()) {
             (InsertMode::PerScan, true) => scan_rays.per_scan(&mut self.per_scan)?,
             (InsertMode::PerScan, false) => {
                 let parts = ScanParts::refused(rules.mapped, &self.stop);
@@ -85,6 +91,7 @@ impl ScanTracer {
             // parts.
             (InsertMode::PerRay, false) => return Ok(None),
         };
+        scan_rays.add_hits(rules.layers, &mut updates)?;
         self.stop.check()?;
         Ok(Some(updates))
     }

@@ -94,6 +94,18 @@ impl<'a> ScanRays<'a> {
         self.clearance
     }
 
+    pub(super) fn mapped(&self) -> MappedTiles<'a> {
+        self.mapped
+    }
+
+    pub(super) fn points(&self) -> &'a dyn ScanPoints {
+        self.points
+    }
+
+    pub(super) fn stop(&self) -> &'a Stop {
+        self.stop
+    }
+
     /// Insertion per scan: one update per voxel, a hit overrides any miss. The result does not depend on the order of
     /// the rays, so they are divided among threads.
     pub(crate) fn per_scan(&self, collectors: &mut Vec<PerScanCollector>) -> Result<ScanUpdates> {
@@ -313,7 +325,7 @@ impl<'a> ScanRays<'a> {
     }
 
     /// Number of parts into which the points are divided, each with its own collector.
-    fn threads(&self) -> usize {
+    pub(super) fn threads(&self) -> usize {
         self.max_threads.min(self.points.len() / MIN_RAYS_PER_THREAD).max(1)
     }
 
@@ -391,7 +403,13 @@ impl<'a> ScanRays<'a> {
     /// Returns the end of the ray to a point; `None` if the point is skipped or its ray crosses no mapped tile. A point
     /// that is marked as moving is no hit.
     #[inline]
-    fn ray(&self, point: Point, intensity: f32, is_moving: bool, report: &mut ScanReport) -> Option<RayEnd> {
+    pub(super) fn ray(
+        &self,
+        point: Point,
+        intensity: f32,
+        is_moving: bool,
+        report: &mut ScanReport,
+    ) -> Option<RayEnd> {
         if self.stop.is_set() {
             return None;
         }
@@ -457,13 +475,13 @@ fn larger(a: Point, b: Point) -> Point {
 }
 
 /// Returns part `part` of `parts` equal parts of a range.
-fn part_of(points: &Range<usize>, part: usize, parts: usize) -> Range<usize> {
+pub(super) fn part_of(points: &Range<usize>, part: usize, parts: usize) -> Range<usize> {
     let at = |part| points.start + points.len() * part / parts;
     at(part)..at(part + 1)
 }
 
 #[inline]
-fn is_set(marks: &[bool], number: usize) -> bool {
+pub(super) fn is_set(marks: &[bool], number: usize) -> bool {
     marks.get(number).is_some_and(|is_set| *is_set)
 }
 

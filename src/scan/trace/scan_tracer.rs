@@ -1,6 +1,6 @@
 use super::scan_rays::{PerScanUpdates, ScanRays};
 use super::trace_limit::TraceLimit;
-use crate::config::{GUARD_REACH, Guard, InsertMode, RayConfig};
+use crate::config::{GUARD_REACH, Guard, InsertMode, Layers, RayConfig};
 use crate::error::{Error, Result};
 use crate::scan::per_ray::PerRayCollector;
 use crate::scan::per_scan::PerScanCollector;
@@ -32,6 +32,7 @@ pub(crate) struct TraceRules<'a> {
     pub(crate) model: &'a SensorModel,
     pub(crate) rays: &'a RayConfig,
     pub(crate) order: UpdateOrder,
+    pub(crate) layers: Layers,
 }
 
 /// Order of a tile's updates in insertion per ray.
@@ -73,7 +74,7 @@ impl ScanTracer {
         scan: &Scan,
     ) -> Result<ScanUpdates> {
         let mapped = MappedTiles { grid, selection: None };
-        self.trace_points(TraceRules { mapped, model, rays, order: UpdateOrder::OfVoxels }, scan, None)
+        self.trace_points(TraceRules::of_evidence(mapped, model, rays, UpdateOrder::OfVoxels), scan, None)
     }
 
     /// Like [`ScanTracer::trace`], but in insertion per ray the updates of a tile are in the order of the rays. Octrees
@@ -90,7 +91,7 @@ impl ScanTracer {
         scan: &Scan,
     ) -> Result<ScanUpdates> {
         let mapped = MappedTiles { grid, selection: None };
-        self.trace_points(TraceRules { mapped, model, rays, order: UpdateOrder::OfRays }, scan, None)
+        self.trace_points(TraceRules::of_evidence(mapped, model, rays, UpdateOrder::OfRays), scan, None)
     }
 
     /// Like [`ScanTracer::trace`], for any source of points and only for the mapped tiles, whose updates are those of
@@ -108,18 +109,20 @@ impl ScanTracer {
     ) -> Result<ScanUpdates> {
         let selection = rules.selection();
         let rules = rules.with_selection(selection.as_deref());
-        let TraceRules { mapped, rays, .. } = rules;
+        let TraceRules { mapped, rays, layers, .. } = rules;
         let traced = rules.traced();
         let threads = rayon::current_num_threads();
         let scan_rays = ScanRays::new(rules, traced.as_deref(), scan, threads, &self.stop)?;
         let is_per_scan = rays.insert_mode == InsertMode::PerScan;
         let in_order = rules.are_rays_in_order();
         let Some(mut overflow) = overflow else {
-            return match (is_per_scan, in_order) {
+            let mut updates = match (is_per_scan, in_order) {
                 (true, _) => scan_rays.per_scan(&mut self.per_scan),
                 (_, true) => scan_rays.per_ray_in_order(),
                 _ => scan_rays.per_ray(&mut self.per_ray),
-            };
+            }?;
+            scan_rays.add_hits(layers, &mut updates)?;
+            return Ok(updates);
         };
         let parts = ScanParts::new(
             mapped,
@@ -131,13 +134,18 @@ impl ScanTracer {
         );
         let report = match (is_per_scan, in_order) {
             (true, _) => match scan_rays.per_scan_in_parts(&mut self.per_scan, &self.limit, &parts)? {
-                PerScanUpdates::Whole(updates) => return Ok(updates),
+                PerScanUpdates::Whole(mut updates) => {
+                    scan_rays.add_hits_in_parts(layers, &mut updates, &mut overflow)?;
+                    return Ok(updates);
+                }
                 PerScanUpdates::InParts(report) => report,
             },
             (_, true) => scan_rays.per_ray_in_order_in_parts(&self.limit, &parts)?,
             _ => scan_rays.per_ray_in_parts(&mut self.per_ray, &self.limit, &parts)?,
         };
-        parts.into_updates(report, is_per_scan, &self.stop, &mut overflow)
+        let mut updates = parts.into_updates(report, is_per_scan, &self.stop, &mut overflow)?;
+        scan_rays.add_hits_in_parts(layers, &mut updates, &mut overflow)?;
+        Ok(updates)
     }
 
     /// Creates a tracer that uses at most `bytes` of memory if it is given an [`Overflow`].
@@ -164,6 +172,16 @@ impl ScanTracer {
 }
 
 impl<'a> TraceRules<'a> {
+    /// Rules for updates of evidence alone.
+    pub(crate) fn of_evidence(
+        mapped: MappedTiles<'a>,
+        model: &'a SensorModel,
+        rays: &'a RayConfig,
+        order: UpdateOrder,
+    ) -> Self {
+        Self { mapped, model, rays, order, layers: Layers::NONE }
+    }
+
     /// The mapped tiles that are in the region of the rays; `None` for the whole space.
     pub(super) fn selection(&self) -> Option<Cow<'a, TileSelection>> {
         match (self.mapped.selection, self.rays.region) {

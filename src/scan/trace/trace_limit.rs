@@ -44,6 +44,11 @@ impl TraceLimit {
         if self.is_none() { self } else { Self::new(self.bytes / tracers.max(1)) }
     }
 
+    /// Returns whether this many bytes, of the points that hit voxels, fit.
+    pub(crate) fn has_room_for_bytes(&self, bytes: usize) -> bool {
+        bytes <= self.bytes / 4
+    }
+
     /// Number of collectors that fit, at most `wanted`.
     pub(crate) fn collectors(&self, wanted: usize) -> usize {
         wanted.min(self.bytes / MIN_COLLECTOR_BYTES).max(1)

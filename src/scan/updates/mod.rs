@@ -1,11 +1,13 @@
 //! Updates of a scan or batch, grouped by tile: brick masks, runs or lists, and a packed form for storage.
 
+mod layer_hits;
 mod mapped_tiles;
 mod packed_updates;
 mod tile_order;
 mod tile_runs;
 mod tile_updates;
 
+pub use layer_hits::{LayerHit, LayerHits, OFFSETS_PER_VOXEL};
 pub(crate) use mapped_tiles::MappedTiles;
 pub use packed_updates::PackedUpdates;
 pub(crate) use tile_order::{

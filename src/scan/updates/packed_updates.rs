@@ -1,5 +1,7 @@
+use super::layer_hits::{LayerHit, LayerHits};
 use super::tile_runs::{BrickRuns, Run, TileRuns};
 use super::tile_updates::{BrickUpdate, OrderedUpdates, TileUpdates};
+use crate::config::Layers;
 use crate::space::{BrickCode, BrickMask};
 use std::io::{self, BufRead};
 
@@ -17,10 +19,16 @@ const RUNS: u8 = 1;
 const ORDERED: u8 = 2;
 /// Like `MASKS`, but each brick also has the mask of its weak misses.
 const GUARDED_MASKS: u8 = 3;
+const LAYERS: u8 = 4;
 
 impl PackedUpdates {
     /// Appends the updates of one scan.
     pub fn push(&mut self, updates: &TileUpdates) {
+        if let TileUpdates::WithLayers(evidence, hits) = updates {
+            self.push(evidence);
+            self.push_hits(hits);
+            return;
+        }
         self.updates += updates.len();
         if let TileUpdates::Packed(packed) = updates {
             return self.bytes.extend_from_slice(&packed.bytes);
@@ -61,8 +69,14 @@ impl PackedUpdates {
                 out.number(intensities.len() as u64);
                 intensities.iter().for_each(|intensity| out.float(*intensity));
             }
-            TileUpdates::Packed(_) => {}
+            TileUpdates::Layers(hits) => out.hits(hits),
+            TileUpdates::Packed(_) | TileUpdates::WithLayers(..) => {}
         }
+    }
+
+    fn push_hits(&mut self, hits: &LayerHits) {
+        self.updates += hits.len();
+        Packer { bytes: &mut self.bytes }.hits(hits);
     }
 
     /// Packs the updates of one scan.
@@ -176,6 +190,37 @@ impl Packer<'_> {
         }
     }
 
+    /// Writes the time stamp, and of each hit the set of its attributes before them.
+    fn hits(&mut self, hits: &LayerHits) {
+        self.byte(LAYERS);
+        let Layers { colour, intensity_max, class, time, shape } = hits.layers;
+        let has_intensity = intensity_max.is_some();
+        self.byte(set_of([colour, has_intensity, class, time, shape, hits.stamp_ns.is_some(), false, false]));
+        intensity_max.iter().for_each(|max| self.float(*max));
+        hits.stamp_ns.iter().for_each(|stamp_ns| self.bytes.extend(stamp_ns.to_le_bytes()));
+        self.number(hits.len() as u64);
+        for hit in hits.iter() {
+            let has_offset = hit.offset != [0; 3];
+            self.byte(set_of([
+                hit.colour.is_some(),
+                hit.intensity.is_some(),
+                hit.class.is_some(),
+                has_offset,
+                false,
+                false,
+                false,
+                false,
+            ]));
+            self.bytes.extend(hit.voxel.to_le_bytes());
+            self.bytes.extend(hit.colour.iter().flatten());
+            hit.intensity.iter().for_each(|intensity| self.bytes.extend(intensity.to_le_bytes()));
+            self.bytes.extend(hit.class);
+            if has_offset {
+                hit.offset.iter().for_each(|offset| self.bytes.extend(offset.to_le_bytes()));
+            }
+        }
+    }
+
     fn run(&mut self, run: &Run) {
         self.number(u64::from(run.place));
         self.number(u64::from(run.misses) << 1 | u64::from(run.hit.is_some()));
@@ -208,6 +253,7 @@ impl<R: BufRead> Unpacker<R> {
             kind @ (MASKS | GUARDED_MASKS) => TileUpdates::Masks(
                 self.bricks(|input, brick| input.brick_update(brick, kind == GUARDED_MASKS))?,
             ),
+            LAYERS => TileUpdates::Layers(self.layer_hits()?),
             RUNS => TileUpdates::Runs(self.tile_runs()?),
             ORDERED => {
                 let voxels = self.many(|input| Ok(u32::from_le_bytes(input.take()?)))?;
@@ -256,6 +302,39 @@ impl<R: BufRead> Unpacker<R> {
         let misses = self.number()?;
         let hit = if misses & 1 == 1 { Some(self.float()?) } else { None };
         Ok(Run { place, misses: (misses >> 1) as u16, hit })
+    }
+
+    fn layer_hits(&mut self) -> io::Result<LayerHits> {
+        let set = self.byte()?;
+        let has = |k: u8| set >> k & 1 == 1;
+        let mut layers =
+            Layers { colour: has(0), intensity_max: None, class: has(2), time: has(3), shape: has(4) };
+        if has(1) {
+            layers.intensity_max = Some(self.float()?);
+        }
+        let stamp_ns = if has(5) { Some(i64::from_le_bytes(self.take()?)) } else { None };
+        let mut hits = LayerHits::new(layers, stamp_ns);
+        for _ in 0..self.number()? {
+            let set = self.byte()?;
+            let has = |k: u8| set >> k & 1 == 1;
+            let mut hit = LayerHit { voxel: u32::from_le_bytes(self.take()?), ..LayerHit::default() };
+            if has(0) {
+                hit.colour = Some(self.take()?);
+            }
+            if has(1) {
+                hit.intensity = Some(u16::from_le_bytes(self.take()?));
+            }
+            if has(2) {
+                hit.class = Some(self.byte()?);
+            }
+            if has(3) {
+                for offset in &mut hit.offset {
+                    *offset = i16::from_le_bytes(self.take()?);
+                }
+            }
+            hits.push(hit);
+        }
+        Ok(hits)
     }
 
     fn mask(&mut self) -> io::Result<BrickMask> {

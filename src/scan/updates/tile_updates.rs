@@ -1,3 +1,4 @@
+use super::layer_hits::LayerHits;
 use super::tile_runs::TileRuns;
 use crate::scan::{PackedUpdates, ScanReport};
 use crate::sensor::Observation;
@@ -30,6 +31,10 @@ pub enum TileUpdates {
     Ordered(OrderedUpdates),
     /// Any of these, packed.
     Packed(PackedUpdates),
+    /// Points that hit voxels, for the layers; no updates of evidence.
+    Layers(LayerHits),
+    /// Updates of evidence, and the points of the same scan that hit voxels.
+    WithLayers(Box<TileUpdates>, LayerHits),
 }
 
 /// Voxels of one brick that one scan updates, each once.
@@ -144,7 +149,14 @@ impl TileUpdates {
             Self::Runs(runs) => runs.len(),
             Self::Ordered(updates) => updates.len(),
             Self::Packed(updates) => updates.len(),
+            Self::Layers(hits) => hits.len(),
+            Self::WithLayers(updates, hits) => updates.len() + hits.len(),
         }
+    }
+
+    /// Adds the points of the same scan that hit voxels.
+    pub(crate) fn with_layers(self, hits: LayerHits) -> Self {
+        if hits.is_empty() { self } else { Self::WithLayers(Box::new(self), hits) }
     }
 
     /// Returns whether there is no update.
@@ -154,6 +166,8 @@ impl TileUpdates {
             Self::Runs(runs) => runs.is_empty(),
             Self::Ordered(updates) => updates.is_empty(),
             Self::Packed(updates) => updates.len() == 0,
+            Self::Layers(hits) => hits.is_empty(),
+            Self::WithLayers(updates, hits) => updates.is_empty() && hits.is_empty(),
         }
     }
 
@@ -167,6 +181,8 @@ impl TileUpdates {
             Self::Runs(runs) => runs.bytes(),
             Self::Ordered(updates) => (updates.voxels.capacity() + updates.intensities.capacity()) * 4,
             Self::Packed(updates) => updates.bytes(),
+            Self::Layers(hits) => hits.bytes(),
+            Self::WithLayers(updates, hits) => updates.bytes() + hits.bytes(),
         };
         size_of::<Self>() + heap
     }

@@ -1,6 +1,6 @@
 use super::commits::Commits;
 use super::input_record::InputRecord;
-use crate::config::{Clearing, RayConfig, Storage};
+use crate::config::{Clearing, Layers, RayConfig, Storage};
 use crate::error::FormatError;
 use crate::sensor::SensorModel;
 use crate::space::TileIndex;
@@ -57,6 +57,9 @@ pub struct Extension {
     /// Storage of the tiles; missing in maps of the original format.
     #[serde(default, skip_serializing_if = "Storage::is_octomap")]
     pub storage: Storage,
+    /// Layers of the map.
+    #[serde(default, skip_serializing_if = "Layers::is_none")]
+    pub layers: Layers,
     /// Coordinate reference system of the map's frame, if known.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub crs: Option<String>,
@@ -89,6 +92,9 @@ pub struct MapParameters {
     /// Rule for the voxels that rays pass; `None` for OctoMap's.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub clearing: Option<Clearing>,
+    /// Layers of the map.
+    #[serde(default, skip_serializing_if = "Layers::is_none")]
+    pub layers: Layers,
 }
 
 impl MapParameters {
@@ -140,6 +146,8 @@ impl ReadExtension {
 const VERSION: &str = "1.0";
 /// Version of maps with guarded clearing. Programs which do not know the rule must not add scans to them.
 const GUARDED_VERSION: &str = "1.1";
+/// Version of maps with layers. Programs which do not know them would drop them.
+const LAYERED_VERSION: &str = "1.2";
 /// The file ends with a checksum of all bytes before it.
 const CHECKSUM_KEY: &str = "    \"crc32\": \"";
 const END: &str = "\"\n  }\n}\n";
@@ -166,6 +174,7 @@ impl Metadata {
             sensor_model: ext.sensor_model,
             occupancy_threshold: ext.occupancy_threshold,
             clearing: ext.rays.clearing,
+            layers: ext.layers,
         })
     }
 
@@ -199,8 +208,13 @@ impl Metadata {
     }
 
     fn version(&self) -> &'static str {
-        let clearing = self.ext.as_ref().and_then(|ext| ext.rays.clearing);
-        if clearing.is_some_and(|clearing| clearing.guard().is_some()) { GUARDED_VERSION } else { VERSION }
+        let Some(ext) = &self.ext else { return VERSION };
+        let is_guarded = ext.rays.clearing().guard().is_some();
+        match (ext.layers.is_none(), is_guarded) {
+            (false, _) => LAYERED_VERSION,
+            (true, true) => GUARDED_VERSION,
+            (true, false) => VERSION,
+        }
     }
 
     /// Returns the text of the file. The original keys come first, in the original order. Lengths are plain decimals.
@@ -231,8 +245,9 @@ impl Metadata {
         let document: Document = serde_json::from_str(text).map_err(|error| {
             FormatError::at_line(error.line() as u64, format!("not a map's metadata: {error}"))
         })?;
-        if ![VERSION, GUARDED_VERSION].contains(&document.version.as_str()) {
-            let known = format!("this program reads {VERSION:?} and {GUARDED_VERSION:?}");
+        if ![VERSION, GUARDED_VERSION, LAYERED_VERSION].contains(&document.version.as_str()) {
+            let known =
+                format!("this program reads {VERSION:?}, {GUARDED_VERSION:?} and {LAYERED_VERSION:?}");
             let reason = format!("version {:?} is not known; {known}", document.version);
             return Err(FormatError::at_offset(0, reason));
         }
@@ -296,6 +311,7 @@ mod tests {
             inputs: vec![InputRecord { first_scan: 45, ..InputRecord::from("abc") }],
             decayed_scan: 0,
             storage: Storage::OctoMap,
+            layers: Layers::NONE,
             crs: None,
             keeps_scans: false,
             catalog: None,

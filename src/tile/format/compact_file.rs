@@ -4,7 +4,7 @@
 
 use super::compact::{CRC_BYTES, CompactIndex, filter_compact, joined_crc, read_compact};
 use super::gather::FilteredVoxels;
-use super::reader::{Decoded, DecodedTable};
+use super::reader::{Decoded, DecodedTable, read_layers, skip};
 use super::trailer::Trailer;
 use crate::error::{DecodeError, FormatError};
 use crate::sensor::Evidence;
@@ -12,19 +12,27 @@ use crate::space::{MortonCode, VoxelBox};
 use std::io::{self, BufReader, Read, Write};
 use std::ops::Range;
 
-/// Writes a table in compact form as `tile.vxt`. The checksum `front.table_crc` is computed here; the given value is
-/// ignored. The file has no octree.
+/// Writes a table in compact form as `tile.vxt`, with the section of its layers
+/// ([`CompactWriter::layer_section`](super::CompactWriter::layer_section)). The checksums of `front` are computed here;
+/// the given values are ignored. The file has no octree.
 ///
 /// # Errors
 ///
 /// Returns errors from `out`, and fails if `compact` is too short for a compact table.
-pub fn write_compact_file(compact: &[u8], front: Trailer, out: &mut impl Write) -> io::Result<()> {
+pub fn write_compact_file(
+    compact: &[u8],
+    layers: &[u8],
+    front: Trailer,
+    out: &mut impl Write,
+) -> io::Result<()> {
     let Some((body, crc)) = compact.split_last_chunk::<{ CRC_BYTES as usize }>() else {
         return Err(io::Error::new(io::ErrorKind::InvalidInput, "not a table in the compact form"));
     };
-    let front = Trailer { table_crc: u32::from_le_bytes(*crc), octree_crc: 0, octree_bytes: 0, ..front };
+    let (octree_crc, octree_bytes) = (crc32fast::hash(layers), layers.len() as u64);
+    let front = Trailer { table_crc: u32::from_le_bytes(*crc), octree_crc, octree_bytes, ..front };
     out.write_all(&front.to_bytes())?;
-    out.write_all(body)
+    out.write_all(body)?;
+    out.write_all(layers)
 }
 
 /// Reads a `tile.vxt` of `file_bytes` bytes that belongs to the tile of `voxels`.
@@ -37,7 +45,11 @@ pub fn read_compact_file(
     file_bytes: u64,
     voxels: &VoxelBox,
 ) -> Result<DecodedTable, DecodeError> {
-    read_after_front(input, file_bytes, |input, bytes| read_compact(&mut { input }, bytes, voxels))
+    let mut input = BufReader::with_capacity(1 << 16, input);
+    let (mut decoded, layer_bytes) =
+        read_after_front(&mut input, file_bytes, |input, bytes| read_compact(&mut { input }, bytes, voxels))?;
+    read_layers(&mut decoded.table, &mut input, file_bytes, layer_bytes, voxels)?;
+    Ok(decoded)
 }
 
 /// Reads the observed voxels of a `tile.vxt` whose log-odds are at least `from`, in Morton order, without building a
@@ -52,22 +64,33 @@ pub fn read_compact_voxels_from(
     voxels: &VoxelBox,
     from: f64,
 ) -> Result<Decoded<FilteredVoxels>, DecodeError> {
-    read_after_front(input, file_bytes, |input, bytes| filter_compact(&mut { input }, bytes, voxels, from))
+    let mut input = BufReader::with_capacity(1 << 16, input);
+    let (decoded, layer_bytes) = read_after_front(&mut input, file_bytes, |input, bytes| {
+        filter_compact(&mut { input }, bytes, voxels, from)
+    })?;
+    skip(&mut input, layer_bytes)?;
+    Ok(decoded)
 }
+
+/// Reads front part and table; also returns the number of bytes that follow.
 
 fn read_after_front<T>(
     input: &mut impl Read,
     file_bytes: u64,
     read: impl FnOnce(&mut dyn Read, u64) -> Result<T, DecodeError>,
-) -> Result<Decoded<T>, DecodeError> {
-    let mut input = BufReader::with_capacity(1 << 16, input);
-    let front = read_compact_front(&mut input, file_bytes)?;
-    let body_bytes = file_bytes - front.bytes();
+) -> Result<(Decoded<T>, u64), DecodeError> {
+    let front = read_compact_front(input, file_bytes)?;
+    let (body_bytes, layer_bytes) = (body_bytes(&front, file_bytes), front.octree_bytes);
     let crc = front.table_crc.to_le_bytes();
-    let mut compact = input.take(body_bytes).chain(&crc[..]);
+    let mut compact = input.by_ref().take(body_bytes).chain(&crc[..]);
     let table =
         read(&mut compact, body_bytes + CRC_BYTES).map_err(|error| error.further_by(front.bytes()))?;
-    Ok(Decoded { table, trailer: Some(front) })
+    Ok((Decoded { table, trailer: Some(front) }, layer_bytes))
+}
+
+/// Bytes of the table between front part and layers.
+fn body_bytes(front: &Trailer, file_bytes: u64) -> u64 {
+    file_bytes - front.bytes() - front.octree_bytes
 }
 
 /// Reads only the front part of a `tile.vxt`.
@@ -77,12 +100,8 @@ fn read_after_front<T>(
 /// Fails if the front part violates the format.
 pub fn read_compact_front(input: &mut impl Read, file_bytes: u64) -> Result<Trailer, DecodeError> {
     let front = Trailer::read_in_front(input, file_bytes)?;
-    if (front.octree_crc, front.octree_bytes) != (0, 0) {
-        return Err(FormatError::at_offset(
-            48,
-            "the front part lists an octree, but compact tiles have none",
-        )
-        .into());
+    if front.octree_bytes > file_bytes - front.bytes() {
+        return Err(FormatError::at_offset(52, "the layers are longer than the file").into());
     }
     Ok(front)
 }
@@ -111,7 +130,7 @@ impl CompactFileIndex {
         voxels: &VoxelBox,
     ) -> Result<Option<Self>, DecodeError> {
         let front = read_compact_front(input, file_bytes)?;
-        let body_bytes = file_bytes - front.bytes();
+        let body_bytes = body_bytes(&front, file_bytes);
         let index = CompactIndex::read(input, body_bytes + CRC_BYTES, voxels)
             .map_err(|error| error.further_by(front.bytes()))?;
         let Some(index) = index else { return Ok(None) };
@@ -120,6 +139,7 @@ impl CompactFileIndex {
             return Err(FormatError::at_offset(44, reason).into());
         }
         let crc = joined_crc(crc32fast::hash(&front.to_bytes()), front.table_crc, body_bytes);
+        let crc = joined_crc(crc, front.octree_crc, front.octree_bytes);
         Ok(Some(Self { front, crc, index }))
     }
 

@@ -1,5 +1,6 @@
 use super::any_order_entries::AnyOrderEntries;
 use super::ascending_entries::AscendingEntries;
+use super::compact::read_layer_section;
 use super::gather::{FilteredVoxels, Gather, VoxelFilter};
 use super::trailer::Trailer;
 use super::{ENTRY_BYTES, EntryBytes, HEADER_BYTES, MAGIC, VERSION};
@@ -45,7 +46,9 @@ pub fn read_table(
     file_bytes: u64,
     voxels: &VoxelBox,
 ) -> Result<DecodedTable, DecodeError> {
-    read_made(input, file_bytes, voxels, Table::default())
+    let (mut decoded, layer_bytes) = read_made(input, file_bytes, voxels, Table::default())?;
+    read_layers(&mut decoded.table, input, file_bytes, layer_bytes, voxels)?;
+    Ok(decoded)
 }
 
 /// Reads the observed voxels of an `iwlo_meta.bin` whose log-odds are at least `from`, in Morton order, without
@@ -60,27 +63,54 @@ pub fn read_voxels_from(
     voxels: &VoxelBox,
     from: f64,
 ) -> Result<Decoded<FilteredVoxels>, DecodeError> {
-    read_made(input, file_bytes, voxels, VoxelFilter::from(from))
+    let (decoded, layer_bytes) = read_made(input, file_bytes, voxels, VoxelFilter::from(from))?;
+    skip(input, layer_bytes)?;
+    Ok(decoded)
 }
 
+/// Reads the layers in the last `bytes` bytes of a file, if there are any.
+pub(super) fn read_layers(
+    table: &mut Table,
+    input: &mut impl Read,
+    file_bytes: u64,
+    bytes: u64,
+    voxels: &VoxelBox,
+) -> Result<(), DecodeError> {
+    if bytes > 0 {
+        let layers = read_layer_section(input, bytes, voxels);
+        table.set_layers(Some(layers.map_err(|error| error.further_by(file_bytes - bytes))?));
+    }
+    Ok(())
+}
+
+/// Reads the next bytes without using them; the checksum of the file covers them.
+pub(super) fn skip(input: &mut impl Read, bytes: u64) -> io::Result<()> {
+    match io::copy(&mut input.take(bytes), &mut io::sink())? == bytes {
+        true => Ok(()),
+        false => Err(io::ErrorKind::UnexpectedEof.into()),
+    }
+}
+
+/// Reads table and trailer; also returns the number of bytes that follow.
 fn read_made<G: Gather>(
     input: &mut impl Read,
     file_bytes: u64,
     voxels: &VoxelBox,
     gather: G,
-) -> Result<Decoded<G::Made>, DecodeError> {
+) -> Result<(Decoded<G::Made>, u64), DecodeError> {
     let mut crc = crc32fast::Hasher::new();
     let (count, trailer_bytes) = read_header(input, file_bytes, &mut crc)?;
     if trailer_bytes == 0 {
         let table = read_entries(input, count, &mut crc, AnyOrderEntries::new(voxels))?;
-        return Ok(Decoded { table: gather.of_table(table), trailer: None });
+        return Ok((Decoded { table: gather.of_table(table), trailer: None }, 0));
     }
     let table = read_entries(input, count, &mut crc, AscendingEntries::new(voxels, gather))?;
     let trailer = Trailer::read(input, HEADER_BYTES + count * ENTRY_BYTES, trailer_bytes)?;
     if trailer.table_crc != crc.finalize() {
         return Err(FormatError::at_offset(0, "the entries do not match the checksum in the trailer").into());
     }
-    Ok(Decoded { table, trailer: Some(trailer) })
+    let layer_bytes = trailer_bytes - trailer.bytes();
+    Ok((Decoded { table, trailer: Some(trailer) }, layer_bytes))
 }
 
 fn read_entries<E: TakeEntries>(

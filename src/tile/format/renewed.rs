@@ -32,6 +32,8 @@ pub fn renew_table(
     }
     let trailer = Trailer::read(input, HEADER_BYTES + entries_bytes, trailer_bytes)?;
     out.write_all(&renew(trailer).to_bytes())?;
+    // The layers, if there are any.
+    io::copy(input, out)?;
     Ok(())
 }
 

@@ -24,9 +24,9 @@ pub struct Trailer {
     pub scan_number: u64,
     /// CRC-32 of header and entries, or of the compact form.
     pub table_crc: u32,
-    /// CRC-32 of the tile's `octree.bt`; 0 with compact storage.
+    /// CRC-32 of the tile's `octree.bt`; with compact storage, of the layers after the table, or 0.
     pub octree_crc: u32,
-    /// Size of the tile's `octree.bt` in bytes; 0 with compact storage.
+    /// Size of the tile's `octree.bt` in bytes; with compact storage, of the layers after the table.
     pub octree_bytes: u64,
     /// Parameters of the map as text, stored after the trailer, so that a map can be rebuilt from its tiles.
     pub parameters: String,
@@ -59,20 +59,20 @@ impl Trailer {
         (TRAILER_BYTES + self.parameters.len()) as u64
     }
 
-    /// Reads the trailer and its parameters, which start at `offset` of a file and take its last `bytes` bytes.
+    /// Reads the trailer and its parameters, which start at `offset` of a file, `bytes` bytes before its end. The layers
+    /// may follow.
     ///
     /// # Errors
     ///
     /// Fails if the length, magic number, version or checksum is wrong.
     pub fn read(input: &mut impl Read, offset: u64, bytes: u64) -> Result<Self, DecodeError> {
-        let is_long_enough = bytes >= TRAILER_BYTES as u64;
-        if !is_long_enough || bytes - TRAILER_BYTES as u64 > MAX_PARAMETERS_BYTES {
+        if bytes < TRAILER_BYTES as u64 {
             let reason = "there must be none or a voxtile trailer";
             let reason = format!("{bytes} bytes follow the last entry; {reason}");
             return Err(FormatError::at_offset(offset, reason).into());
         }
         let fixed = Fixed::read(input, offset)?;
-        if bytes != fixed.all_bytes() {
+        if bytes < fixed.all_bytes() {
             let (found, wanted) = (bytes - TRAILER_BYTES as u64, fixed.parameters_bytes());
             let reason = format!("{found} bytes of parameters instead of {wanted}");
             return Err(FormatError::at_offset(offset + 60, reason).into());

@@ -13,9 +13,15 @@ pub struct TableChecksums {
     pub bytes: u64,
 }
 
-/// Writes a table as the stream `iwlo_meta.bin`. The checksum `trailer.table_crc` is computed here; the given value is
-/// ignored.
-pub fn write_table(table: &Table, trailer: Trailer, out: &mut impl Write) -> io::Result<TableChecksums> {
+/// Writes a table as the stream `iwlo_meta.bin`, with the section of its layers
+/// ([`CompactWriter::layer_section`](super::CompactWriter::layer_section)). The checksum `trailer.table_crc` is computed
+/// here; the given value is ignored.
+pub fn write_table(
+    table: &Table,
+    layers: &[u8],
+    trailer: Trailer,
+    out: &mut impl Write,
+) -> io::Result<TableChecksums> {
     let mut crc = crc32fast::Hasher::new();
     let mut bytes = 0;
     let mut write = |chunk: &[u8]| {
@@ -32,5 +38,6 @@ pub fn write_table(table: &Table, trailer: Trailer, out: &mut impl Write) -> io:
     let table_crc = crc.finalize();
     let trailer = Trailer { table_crc, ..trailer }.to_bytes();
     out.write_all(&trailer)?;
-    Ok(TableChecksums { table_crc, bytes: bytes + trailer.len() as u64 })
+    out.write_all(layers)?;
+    Ok(TableChecksums { table_crc, bytes: bytes + (trailer.len() + layers.len()) as u64 })
 }

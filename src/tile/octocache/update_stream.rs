@@ -67,6 +67,11 @@ impl<'a> UpdateStream<'a> {
             TileUpdates::Packed(packed) => {
                 packed.iter().for_each(|updates| self.apply(table, model, first, &updates));
             }
+            TileUpdates::Layers(hits) => table.add_hits(first, hits),
+            TileUpdates::WithLayers(updates, hits) => {
+                self.apply(table, model, first, updates);
+                table.add_hits(first, hits);
+            }
         }
         self.pass_on();
     }

@@ -4,8 +4,10 @@ use super::brick_view::BrickView;
 use super::palette::Palette;
 use super::summary::{Summary, larger};
 use crate::octree::write_bt_of_bricks;
+use crate::scan::LayerHits;
 use crate::sensor::Evidence;
 use crate::space::{BRICK_EDGE, BrickCode, BrickMask, MortonCode, VoxelBox, VoxelIndex, VoxelKey, places};
+use crate::tile::layers::{LayerTable, VoxelLayers};
 use std::io::{self, Write};
 use std::ops::Range;
 
@@ -27,6 +29,8 @@ pub struct Table {
     pub(crate) cell_bytes: usize,
     /// Number of bricks that stopped using the palette since its last clean-up.
     pub(crate) made_plain: usize,
+    /// What the map stores of the points that hit voxels; `None` without a hit or without layers.
+    layers: Option<Box<LayerTable>>,
 }
 
 impl Table {
@@ -47,6 +51,34 @@ impl Table {
             + self.order.capacity() * size_of::<u32>()
             + self.palette.bytes()
             + self.cell_bytes
+            + self.layer_bytes()
+    }
+
+    /// Bytes of memory on the heap of the layers.
+    pub fn layer_bytes(&self) -> usize {
+        self.layers.as_ref().map_or(0, |layers| size_of::<LayerTable>() + layers.bytes())
+    }
+
+    /// What the map stores of the points that hit voxels; `None` without a hit or without layers.
+    pub fn layers(&self) -> Option<&LayerTable> {
+        self.layers.as_deref()
+    }
+
+    /// What the map stores of the points that hit a voxel; `None` without a hit or without layers.
+    pub fn layers_of(&self, voxel: MortonCode) -> Option<VoxelLayers> {
+        self.layers.as_ref()?.get(voxel)
+    }
+
+    /// Replaces the layers.
+    pub(crate) fn set_layers(&mut self, layers: Option<LayerTable>) {
+        self.layers = layers.filter(|layers| !layers.is_empty()).map(Box::new);
+    }
+
+    /// Adds points that hit voxels to the layers; `first` is the tile's lowest voxel.
+    pub(crate) fn add_hits(&mut self, first: VoxelIndex, hits: &LayerHits) {
+        if !hits.is_empty() {
+            self.layers.get_or_insert_with(|| Box::new(LayerTable::new(hits.layers))).add(first, hits);
+        }
     }
 
     /// The evidence of a voxel; `None` if it was never observed.

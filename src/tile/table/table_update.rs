@@ -20,6 +20,11 @@ impl Table {
             TileUpdates::Packed(packed) => {
                 packed.iter().for_each(|updates| self.apply(model, first, &updates));
             }
+            TileUpdates::Layers(hits) => self.add_hits(first, hits),
+            TileUpdates::WithLayers(updates, hits) => {
+                self.apply(model, first, updates);
+                self.add_hits(first, hits);
+            }
         }
     }
 

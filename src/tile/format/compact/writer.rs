@@ -5,6 +5,7 @@ use super::effort::CompactEffort;
 use super::group::{Group, GroupSizes};
 use super::group_index::{ENTRY_BYTES, GroupIndex};
 use super::header::{HEADER_BYTES, Header};
+use super::layer_section::layer_section;
 use crate::tile::Table;
 use std::fmt;
 use std::io::{self, Write};
@@ -82,6 +83,15 @@ impl CompactWriter {
         let crc = index.crc_of_all(crc32fast::hash(&out[..codebook_begin]), &header);
         out.extend_from_slice(&crc.to_le_bytes());
         Ok(out)
+    }
+
+    /// Returns the section with the table's layers, which follows the table in files; empty if it has none.
+    ///
+    /// # Errors
+    ///
+    /// Returns errors from zstd.
+    pub fn layer_section(&mut self, table: &Table) -> io::Result<Vec<u8>> {
+        table.layers().map_or(Ok(Vec::new()), |layers| layer_section(layers, &mut self.column_writer))
     }
 }
 
