@@ -8,7 +8,6 @@ use std::fmt;
 /// All layers are sums of integers, so they do not depend on the order of points, scans and merged maps.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-#[non_exhaustive]
 pub struct Layers {
     /// Sums of red, green and blue.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]

@@ -1,7 +1,9 @@
 use crate::config::RayConfig;
 use crate::error::Result;
 use crate::persistence::{PointReader, read_marks};
-use crate::scan::{MovingMarks, Pose, ScanPoints, TakePoints};
+use crate::scan::{
+    AttributeSet, MovingMarks, PointAttributes, PointFrame, Pose, ScanPoints, TakeAttributed, TakePoints,
+};
 use crate::space::Point;
 use crate::store::{Disk, KeptFrame, KeptRecord, Layout};
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
@@ -21,7 +23,7 @@ pub struct KeptScan {
 
 #[derive(Clone, Debug)]
 enum Points {
-    InMemory(Vec<Point>, Vec<f32>),
+    InMemory(Vec<Point>, Vec<f32>, PointAttributes),
     /// Read from disk at each use.
     OnDisk(Arc<dyn Disk>, Layout),
 }
@@ -46,13 +48,15 @@ impl KeptScan {
         let moving = read_marks(&**disk, layout, &record)?.map(Arc::new);
         let mut scan = Self { record, world_from_sensor, points, moving };
         if scan.record.points <= max_points {
-            let (mut points, mut intensities) = (Vec::new(), Vec::new());
-            scan.for_each_own_chunk(0..scan.len(), &mut |some, of_some| {
+            let (mut points, mut intensities, mut all) = (Vec::new(), Vec::new(), PointAttributes::default());
+            let range = 0..scan.len();
+            scan.for_each_attributed_chunk(range, PointFrame::Own, &mut |some, of_some, attributes| {
                 points.extend_from_slice(some);
                 intensities.extend_from_slice(of_some.unwrap_or_default());
+                all.extend(attributes);
                 true
             })?;
-            scan.points = Points::InMemory(points, intensities);
+            scan.points = Points::InMemory(points, intensities, all);
         }
         Ok(scan)
     }
@@ -124,30 +128,58 @@ impl ScanPoints for KeptScan {
     }
 
     fn for_each_own_chunk(&self, range: Range<usize>, take: &mut TakePoints<'_>) -> Result<()> {
+        self.for_each_block(range, &mut |points, intensities, _| take(points, intensities))
+    }
+
+    fn attributes(&self) -> AttributeSet {
+        AttributeSet { colours: self.record.has_colours, classes: self.record.has_classes }
+    }
+
+    fn for_each_attributed_chunk(
+        &self,
+        range: Range<usize>,
+        frame: PointFrame,
+        take: &mut TakeAttributed<'_>,
+    ) -> Result<()> {
+        let Some(pose) = self.world_from_sensor.filter(|_| frame == PointFrame::World) else {
+            return self.for_each_block(range, take);
+        };
+        let (to_world, mut in_world) = (pose.to_world(), Vec::new());
+        self.for_each_block(range, &mut |points, intensities, attributes| {
+            in_world.clear();
+            in_world.extend(points.iter().copied().map(to_world));
+            take(&in_world, intensities, attributes)
+        })
+    }
+}
+
+impl KeptScan {
+    fn for_each_block(&self, range: Range<usize>, take: &mut TakeAttributed<'_>) -> Result<()> {
         let has_intensities = self.record.has_intensities;
         let (disk, layout) = match &self.points {
             Points::OnDisk(disk, layout) => (disk, layout),
-            Points::InMemory(points, intensities) => {
+            Points::InMemory(points, intensities, attributes) => {
                 let of = |range: Range<usize>| {
                     let intensities = intensities.get(range.clone()).filter(|_| has_intensities);
                     points.get(range).map(|points| (points, intensities))
                 };
-                if let Some((points, intensities)) = of(range) {
-                    take(points, intensities);
+                if let Some((points, intensities)) = of(range.clone()) {
+                    take(points, intensities, attributes.part(range));
                 }
                 return Ok(());
             }
         };
         let mut input = PointReader::open(&**disk, layout, self.record.place)?;
-        let (mut points, mut intensities, mut first) = (Vec::new(), Vec::new(), 0);
-        while first < range.end && input.next(&mut points, &mut intensities)? {
-            input.check_intensities(points.len(), intensities.len(), has_intensities)?;
+        let (mut points, mut intensities, mut attributes) = Default::default();
+        let mut first = 0;
+        while first < range.end && input.next(&mut points, &mut intensities, &mut attributes)? {
+            input.check_attributes(intensities.len(), attributes.set(), &self.record)?;
             let end = first + points.len();
             let wanted = range.start.max(first)..range.end.min(end);
             if wanted.start < wanted.end {
                 let some = wanted.start - first..wanted.end - first;
                 let of_some = has_intensities.then(|| &intensities[some.clone()]);
-                if !take(&points[some], of_some) {
+                if !take(&points[some.clone()], of_some, attributes.part(some)) {
                     return Ok(());
                 }
             }

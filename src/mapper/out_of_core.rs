@@ -594,6 +594,8 @@ fn kept_record(
         rays: *rays,
         points: scan.len() as u64,
         has_intensities: scan.has_intensities(),
+        has_colours: scan.attributes().colours,
+        has_classes: scan.attributes().classes,
         updates: report.hits + report.misses,
         place,
         moving,

@@ -1,5 +1,5 @@
 use crate::error::Result;
-use crate::scan::{MAX_BLOCK_BYTES, MovingMarks, PointDecoder};
+use crate::scan::{AttributeSet, MAX_BLOCK_BYTES, MovingMarks, PointAttributes, PointDecoder};
 use crate::space::Point;
 use crate::store::{self, Disk, KeptRecord, Layout, SegmentPlace, SegmentReader};
 
@@ -26,21 +26,35 @@ impl PointReader {
     /// # Errors
     ///
     /// Damage or an I/O error.
-    pub(crate) fn next(&mut self, points: &mut Vec<Point>, intensities: &mut Vec<f32>) -> Result<bool> {
+    pub(crate) fn next(
+        &mut self,
+        points: &mut Vec<Point>,
+        intensities: &mut Vec<f32>,
+        attributes: &mut PointAttributes,
+    ) -> Result<bool> {
         points.clear();
         intensities.clear();
+        attributes.clear();
         let at = self.blocks.at();
         let Some(block) = self.blocks.next_block()? else { return Ok(false) };
-        let decoded = self.decoder.decode(block, points, intensities);
+        let decoded = self.decoder.decode(block, points, intensities, attributes);
         decoded.map_err(|error| self.blocks.damaged(at, &error.to_string()))?;
         Ok(true)
     }
 
-    pub(crate) fn check_intensities(&self, points: usize, intensities: usize, has_any: bool) -> Result<()> {
-        match intensities == if has_any { points } else { 0 } {
+    /// Checks that the points of a block have the attributes that the record names.
+    pub(crate) fn check_attributes(
+        &self,
+        intensities: usize,
+        attributes: AttributeSet,
+        record: &KeptRecord,
+    ) -> Result<()> {
+        match (intensities > 0) == record.has_intensities
+            && (attributes.colours, attributes.classes) == (record.has_colours, record.has_classes)
+        {
             true => Ok(()),
             false => {
-                let reason = "a block with intensities that do not match its points";
+                let reason = "a block with attributes that do not match its points";
                 Err(self.blocks.damaged(self.blocks.at(), reason))
             }
         }
@@ -88,8 +102,9 @@ pub(crate) fn read_marks(disk: &dyn Disk, layout: &Layout, scan: &KeptRecord) ->
 /// Checks that the points of a kept scan are intact.
 pub(crate) fn check_points(disk: &dyn Disk, layout: &Layout, scan: &KeptRecord) -> Result<()> {
     let mut input = PointReader::open(disk, layout, scan.place)?;
-    let (mut points, mut intensities, mut count) = (Vec::new(), Vec::new(), 0);
-    while input.next(&mut points, &mut intensities)? {
+    let (mut points, mut intensities, mut attributes) = Default::default();
+    let mut count = 0;
+    while input.next(&mut points, &mut intensities, &mut attributes)? {
         count += points.len() as u64;
     }
     input.check_count(count, scan)

@@ -21,7 +21,15 @@ pub struct AttributeSlices<'a> {
     pub classes: &'a [Option<u8>],
 }
 
-impl AttributeSlices<'_> {
+impl<'a> AttributeSlices<'a> {
+    /// Attributes of a range of the points.
+    pub fn part(self, range: Range<usize>) -> Self {
+        AttributeSlices {
+            colours: self.colours.get(range.clone()).unwrap_or_default(),
+            classes: self.classes.get(range).unwrap_or_default(),
+        }
+    }
+
     /// Colour of a point.
     #[inline]
     pub fn colour(&self, number: usize) -> Option<[u8; 3]> {
@@ -58,10 +66,12 @@ impl PointAttributes {
 
     /// Attributes of a range of points.
     pub fn part(&self, range: Range<usize>) -> AttributeSlices<'_> {
-        AttributeSlices {
-            colours: self.colours.get(range.clone()).unwrap_or_default(),
-            classes: self.classes.get(range).unwrap_or_default(),
-        }
+        self.all().part(range)
+    }
+
+    /// Attributes of all points.
+    pub fn all(&self) -> AttributeSlices<'_> {
+        AttributeSlices { colours: &self.colours, classes: &self.classes }
     }
 
     /// Appends attributes of further points.

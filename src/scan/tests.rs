@@ -59,6 +59,7 @@ fn add(by_voxel: &mut UpdatesByVoxel, grid: &Grid, tile: TileIndex, updates: &Ti
             }
         }
         TileUpdates::Packed(packed) => packed.iter().for_each(|updates| add(by_voxel, grid, tile, &updates)),
+        TileUpdates::Layers(_) | TileUpdates::WithLayers(..) => panic!("these scans have no layers"),
     }
 }
 

@@ -7,8 +7,7 @@ use testkit::faulty_disk::{Fault, FaultyDisk, Unsynced};
 use voxtile::integrity::{Repair, repair};
 use voxtile::mapper::KeptScan;
 use voxtile::operations::{delete_snapshot, snapshot};
-use voxtile::scan::PointBlocks;
-use voxtile::scan::ScanPoints;
+use voxtile::scan::{AttributeSlices, PointBlocks, ScanPoints};
 use voxtile::store::{CatalogEntry, KeptFrame, KeptRecord, SegmentPlace, TileStore};
 use voxtile::{Error, MapReader, Mapper, OutOfCoreTileMapper, RayConfig, Result, ScanRef};
 
@@ -112,7 +111,7 @@ impl Writer {
         let archive = self.store.archive_mut();
         archive.begin_scan()?;
         let (mut blocks, put) = (PointBlocks::default(), &mut |block: &[u8]| archive.push_block(block));
-        blocks.push(&points(name), None, put)?;
+        blocks.push(&points(name), None, AttributeSlices::default(), put)?;
         blocks.end(false, put)?;
         Ok(archive.end_scan())
     }
@@ -126,6 +125,8 @@ impl Writer {
             rays: RayConfig::default(),
             points: 40,
             has_intensities: false,
+            has_colours: false,
+            has_classes: false,
             updates: 0,
             place,
             moving: None,

@@ -32,6 +32,8 @@ mod kept_damage;
 mod kept_scans;
 /// Dependencies between the engine's modules.
 mod layering;
+/// Layers.
+mod layers;
 /// Leftovers of killed or failed commands.
 mod leftovers;
 /// Concurrent queries in threads with small stacks.

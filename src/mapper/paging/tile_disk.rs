@@ -3,7 +3,7 @@ use crate::config::MapConfig;
 use crate::error::{Error, Result};
 use crate::mapper::statistics::{IoCounts, MapStatistics};
 use crate::persistence::{CompactTile, IoThreads, Loaded, Saved, TileSaver, load, new_metadata, upgrade};
-use crate::scan::{MovingMarks, PackedUpdates, PointBlocks, ScanPoints, TileUpdates};
+use crate::scan::{MovingMarks, PackedUpdates, PointBlocks, PointFrame, ScanPoints, TileUpdates};
 use crate::space::{TileIndex, TileTable};
 use crate::store::{
     BegunCommit, CatalogEntry, InputRecord, KeptMarks, Metadata, SegmentPlace, SnapshotName, SpillFile,
@@ -305,10 +305,12 @@ impl TileDisk {
         archive.begin_scan()?;
         blocks.begin();
         let (mut written, put) = (Ok(()), &mut |block: &[u8]| archive.push_block(block));
-        let read = scan.for_each_own_chunk(0..scan.len(), &mut |points, intensities| {
-            written = blocks.push(points, intensities, put);
-            written.is_ok()
-        });
+        let all = 0..scan.len();
+        let read =
+            scan.for_each_attributed_chunk(all, PointFrame::Own, &mut |points, intensities, attributes| {
+                written = blocks.push(points, intensities, attributes, put);
+                written.is_ok()
+            });
         let mut kept = read.and(written).and_then(|()| blocks.end(scan.has_intensities(), put));
         let place = archive.end_scan();
         let mut moving = None;

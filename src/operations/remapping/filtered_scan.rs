@@ -1,6 +1,9 @@
 use crate::error::Result;
 use crate::mapper::KeptScan;
-use crate::scan::{ChunkMarks, MovingMarks, MovingMarksBuilder, Pose, ScanPoints, TakePoints};
+use crate::scan::{
+    AttributeSet, ChunkMarks, MovingMarks, MovingMarksBuilder, PointAttributes, PointFrame, Pose, ScanPoints,
+    TakeAttributed, TakePoints,
+};
 use crate::space::{Aabb, Point};
 use std::ops::Range;
 
@@ -38,30 +41,28 @@ impl<'a> FilteredScan<'a> {
         (0..3).all(|axis| min[axis] <= in_world[axis] && in_world[axis] < max[axis]) == self.is_inside
     }
 
-    fn pick(
-        &self,
-        range: Range<usize>,
-        to_world: impl Fn(Point) -> Point,
-        gives_own: bool,
-        take: &mut TakePoints<'_>,
-    ) -> Result<()> {
+    fn pick(&self, range: Range<usize>, frame: PointFrame, take: &mut TakeAttributed<'_>) -> Result<()> {
+        let to_world = self.to_world();
         let (mut number, mut goes_on) = (0, true);
-        let (mut points, mut picked) = (Vec::new(), Vec::new());
-        self.scan.for_each_own_chunk(0..self.scan.len(), &mut |some, intensities| {
+        let (mut points, mut picked, mut of_picked) = (Vec::new(), Vec::new(), PointAttributes::default());
+        let all = 0..self.scan.len();
+        self.scan.for_each_attributed_chunk(all, PointFrame::Own, &mut |some, intensities, attributes| {
             points.clear();
             picked.clear();
+            of_picked.clear();
             for (at, &own) in some.iter().enumerate() {
                 let in_world = to_world(own);
                 if self.takes(&in_world) {
                     if range.contains(&number) {
-                        points.push(if gives_own { own } else { in_world });
+                        points.push(if frame == PointFrame::Own { own } else { in_world });
+                        of_picked.extend(attributes.part(at..at + 1));
                         picked.extend(intensities.map(|intensities| intensities[at]));
                     }
                     number += 1;
                 }
             }
             if !points.is_empty() {
-                goes_on = take(&points, intensities.map(|_| &*picked));
+                goes_on = take(&points, intensities.map(|_| &*picked), of_picked.all());
             }
             goes_on && number < range.end
         })
@@ -95,7 +96,7 @@ impl ScanPoints for FilteredScan<'_> {
     }
 
     fn for_each_chunk(&self, range: Range<usize>, take: &mut TakePoints<'_>) -> Result<()> {
-        self.pick(range, self.to_world(), false, take)
+        self.pick(range, PointFrame::World, &mut |points, intensities, _| take(points, intensities))
     }
 
     fn world_from_sensor(&self) -> Option<Pose> {
@@ -103,6 +104,19 @@ impl ScanPoints for FilteredScan<'_> {
     }
 
     fn for_each_own_chunk(&self, range: Range<usize>, take: &mut TakePoints<'_>) -> Result<()> {
-        self.pick(range, self.to_world(), true, take)
+        self.pick(range, PointFrame::Own, &mut |points, intensities, _| take(points, intensities))
+    }
+
+    fn attributes(&self) -> AttributeSet {
+        self.scan.attributes()
+    }
+
+    fn for_each_attributed_chunk(
+        &self,
+        range: Range<usize>,
+        frame: PointFrame,
+        take: &mut TakeAttributed<'_>,
+    ) -> Result<()> {
+        self.pick(range, frame, take)
     }
 }

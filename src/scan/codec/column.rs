@@ -81,6 +81,18 @@ impl ColumnWriter {
         self.put_form(values, depths, &form, out).map(drop)
     }
 
+    /// Appends words of so many bytes without a form.
+    pub(super) fn put_words(
+        &mut self,
+        words: impl Iterator<Item = u64>,
+        bytes: usize,
+        out: &mut Vec<u8>,
+    ) -> io::Result<()> {
+        self.words.clear();
+        self.words.extend(words);
+        self.planes.put(&self.words, bytes, out)
+    }
+
     /// Chooses the form with the smallest encoding of a sample; falls back to one that is not a grid.
     fn choose(&mut self, values: &[f64], width: Width, may_be_grid: bool) -> io::Result<Form> {
         let first = values.len().saturating_sub(SAMPLE_SIZE) / 2;
@@ -205,6 +217,19 @@ pub(super) struct ColumnReader {
 }
 
 impl ColumnReader {
+    /// Reads words that [`ColumnWriter::put_words`] wrote.
+    pub(super) fn take_words(
+        &mut self,
+        points: usize,
+        bytes: usize,
+        input: &mut BlockInput<'_>,
+    ) -> Result<&[u64], FormatError> {
+        self.words.clear();
+        self.words.resize(points, 0);
+        self.planes.take(&mut self.words, bytes, input)?;
+        Ok(&self.words)
+    }
+
     /// Reads a column of `points` values; replaces the content of the list.
     pub(super) fn take(
         &mut self,

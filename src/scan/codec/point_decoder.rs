@@ -1,8 +1,9 @@
 use super::column::ColumnReader;
 use super::planes::BlockInput;
 use super::words::Width;
-use super::{MAX_POINTS, VERSION};
+use super::{CLASS_BYTES, CLASSES, COLOUR_BYTES, COLOURS, INTENSITIES, MAX_POINTS, VERSION};
 use crate::error::FormatError;
+use crate::scan::PointAttributes;
 use crate::space::Point;
 use std::fmt;
 
@@ -14,7 +15,7 @@ pub(crate) struct PointDecoder {
 }
 
 impl PointDecoder {
-    /// Appends the points of a block and their intensities; returns whether it has intensities. After an error some of
+    /// Appends the points of a block, their intensities and attributes; returns whether it has intensities. After an error some of
     /// the points may have been appended.
     ///
     /// # Errors
@@ -25,16 +26,17 @@ impl PointDecoder {
         block: &[u8],
         points: &mut Vec<Point>,
         intensities: &mut Vec<f32>,
+        attributes: &mut PointAttributes,
     ) -> Result<bool, FormatError> {
         let mut input = BlockInput::new(block);
         if input.byte()? != VERSION {
             return Err(input.wrong("a block of points of a newer version"));
         }
-        let has_intensities = match input.byte()? {
-            0 => false,
-            1 => true,
-            _ => return Err(input.wrong("a block of points with unknown columns")),
-        };
+        let set = input.byte()?;
+        if set & !(INTENSITIES | COLOURS | CLASSES) != 0 {
+            return Err(input.wrong("a block of points with unknown columns"));
+        }
+        let has_intensities = set & INTENSITIES != 0;
         let count = input.number()?;
         if count > MAX_POINTS {
             return Err(input.wrong("a block of too many points"));
@@ -47,6 +49,17 @@ impl PointDecoder {
         if has_intensities {
             columns.take(count, None, z, &mut input)?;
             intensities.extend(z.iter().map(|value| f32::from_bits(Width::Narrow.bits(*value) as u32)));
+        }
+        if set & COLOURS != 0 {
+            let words = columns.take_words(count, COLOUR_BYTES, &mut input)?;
+            attributes.colours.extend(words.iter().map(|word| {
+                let [has, red, green, blue] = (*word as u32).to_be_bytes();
+                (has == 1).then_some([red, green, blue])
+            }));
+        }
+        if set & CLASSES != 0 {
+            let words = columns.take_words(count, CLASS_BYTES, &mut input)?;
+            attributes.classes.extend(words.iter().map(|word| (word >> 8 == 1).then_some(*word as u8)));
         }
         match input.is_at_end() {
             true => Ok(has_intensities),

@@ -1,6 +1,7 @@
-use super::VERSION;
 use super::column::ColumnWriter;
 use super::words::widen;
+use super::{CLASS_BYTES, CLASSES, COLOUR_BYTES, COLOURS, INTENSITIES, VERSION};
+use crate::scan::AttributeSlices;
 use crate::space::{Point, put_number};
 use std::fmt;
 use std::io;
@@ -14,7 +15,8 @@ pub(crate) struct PointEncoder {
 }
 
 impl PointEncoder {
-    /// Appends a block of at most [`MAX_POINTS`](super::MAX_POINTS) points, with their intensities if they have any.
+    /// Appends a block of at most [`MAX_POINTS`](super::MAX_POINTS) points, with the intensities and attributes that they
+    /// have.
     ///
     /// # Errors
     ///
@@ -23,9 +25,18 @@ impl PointEncoder {
         &mut self,
         points: &[Point],
         intensities: Option<&[f32]>,
+        attributes: AttributeSlices<'_>,
         out: &mut Vec<u8>,
     ) -> io::Result<()> {
-        out.extend([VERSION, u8::from(intensities.is_some())]);
+        let AttributeSlices { colours, classes } = attributes;
+        let columns = [
+            (intensities.is_some(), INTENSITIES),
+            (!colours.is_empty(), COLOURS),
+            (!classes.is_empty(), CLASSES),
+        ];
+        let set =
+            columns.into_iter().filter(|(is_there, _)| *is_there).fold(0, |set, (_, column)| set | column);
+        out.extend([VERSION, set]);
         put_number(points.len() as u64, out);
         let Self { columns, depths, values } = self;
         let fill = |values: &mut Vec<f64>, axis: usize| {
@@ -42,6 +53,16 @@ impl PointEncoder {
             values.clear();
             values.extend(intensities.iter().map(|intensity| widen(intensity.to_bits())));
             columns.put(3, values, None, out)?;
+        }
+        if !colours.is_empty() {
+            let word = |colour: &Option<[u8; 3]>| {
+                colour.map_or(0, |[red, green, blue]| u64::from(u32::from_be_bytes([1, red, green, blue])))
+            };
+            columns.put_words(colours.iter().map(word), COLOUR_BYTES, out)?;
+        }
+        if !classes.is_empty() {
+            let word = |class: &Option<u8>| class.map_or(0, |class| 1 << 8 | u64::from(class));
+            columns.put_words(classes.iter().map(word), CLASS_BYTES, out)?;
         }
         Ok(())
     }

@@ -1,10 +1,11 @@
 use super::*;
+use crate::scan::{AttributeSlices, PointAttributes};
 use crate::space::Point;
 use proptest::prelude::*;
 
 fn encoded(points: &[Point], intensities: Option<&[f32]>) -> Vec<u8> {
     let mut block = Vec::new();
-    PointEncoder::default().encode(points, intensities, &mut block).unwrap();
+    PointEncoder::default().encode(points, intensities, AttributeSlices::default(), &mut block).unwrap();
     block
 }
 
@@ -12,7 +13,9 @@ fn encoded(points: &[Point], intensities: Option<&[f32]>) -> Vec<u8> {
 fn round_trip(points: &[Point], intensities: Option<&[f32]>) -> usize {
     let block = encoded(points, intensities);
     let (mut decoded, mut of_decoded) = (Vec::new(), Vec::new());
-    let has = PointDecoder::default().decode(&block, &mut decoded, &mut of_decoded).unwrap();
+    let has = PointDecoder::default()
+        .decode(&block, &mut decoded, &mut of_decoded, &mut PointAttributes::default())
+        .unwrap();
     assert_eq!(has, intensities.is_some());
     let bits = |points: &[Point]| points.iter().map(|point| point.map(f64::to_bits)).collect::<Vec<_>>();
     assert!(bits(&decoded) == bits(points), "{} points", points.len());
@@ -108,7 +111,9 @@ fn damaged_blocks_are_errors_or_points() {
         let block = encoded(scan, Some(&intensities));
         let decode = |block: &[u8]| {
             let (mut points, mut of_points) = (Vec::new(), Vec::new());
-            PointDecoder::default().decode(block, &mut points, &mut of_points).is_ok()
+            PointDecoder::default()
+                .decode(block, &mut points, &mut of_points, &mut PointAttributes::default())
+                .is_ok()
         };
         for length in (0..block.len()).step_by(37) {
             assert!(!decode(&block[..length]), "{length}");
@@ -151,7 +156,7 @@ proptest! {
         let mut block = vec![1, 1];
         block.extend(&bytes);
         let (mut points, mut intensities) = (Vec::new(), Vec::new());
-        let _ = PointDecoder::default().decode(&block, &mut points, &mut intensities);
+        let _ = PointDecoder::default().decode(&block, &mut points, &mut intensities, &mut PointAttributes::default());
         prop_assert!(points.len() <= MAX_POINTS);
     }
 }
@@ -185,10 +190,12 @@ fn print_sizes_and_times_of_real_sets() {
                 let first = number * MAX_POINTS;
                 let of_points = scan.intensities.as_ref().map(|all| &all[first..first + points.len()]);
                 let (mut block, began) = (Vec::new(), Instant::now());
-                encoder.encode(points, of_points, &mut block).unwrap();
+                encoder.encode(points, of_points, AttributeSlices::default(), &mut block).unwrap();
                 encoding_s += began.elapsed().as_secs_f64();
                 let (mut decoded, mut of_decoded, began) = (Vec::new(), Vec::new(), Instant::now());
-                decoder.decode(&block, &mut decoded, &mut of_decoded).unwrap();
+                decoder
+                    .decode(&block, &mut decoded, &mut of_decoded, &mut PointAttributes::default())
+                    .unwrap();
                 decoding_s += began.elapsed().as_secs_f64();
                 count += points.len();
                 bytes += block.len();
@@ -198,5 +205,23 @@ fn print_sizes_and_times_of_real_sets() {
         let a_point = bytes as f64 / count as f64;
         let line = format!("{set:36} {count:9} {a_point:6.2} bytes {encoding:6.1} ns {decoding:6.1} ns\n");
         std::io::Write::write_all(&mut std::io::stderr(), line.as_bytes()).unwrap();
+    }
+}
+
+#[test]
+fn colours_and_classes_round_trip() {
+    let points = turn(3000, &mut 3);
+    let colours: Vec<_> = (0..3000).map(|k| (k % 7 > 0).then_some([k as u8, (k / 3) as u8, 255])).collect();
+    let classes: Vec<_> = (0..3000).map(|k| (k % 5 > 0).then_some((k / 300) as u8)).collect();
+    for (has_colours, has_classes) in [(true, true), (true, false), (false, true)] {
+        let attributes = PointAttributes {
+            colours: if has_colours { colours.clone() } else { Vec::new() },
+            classes: if has_classes { classes.clone() } else { Vec::new() },
+        };
+        let (mut block, mut decoded, mut intensities) = Default::default();
+        PointEncoder::default().encode(&points, None, attributes.all(), &mut block).unwrap();
+        let mut found = PointAttributes::default();
+        PointDecoder::default().decode(&block, &mut decoded, &mut intensities, &mut found).unwrap();
+        assert!(decoded == points && found == attributes);
     }
 }

@@ -46,6 +46,10 @@ pub struct KeptRecord {
     pub points: u64,
     /// Whether the points have intensities.
     pub has_intensities: bool,
+    /// Whether the points have colours.
+    pub has_colours: bool,
+    /// Whether the points have classes.
+    pub has_classes: bool,
     /// Number of voxel updates when the scan was mapped. A voxel may be counted repeatedly.
     pub updates: u64,
     /// Location of the points.
@@ -80,6 +84,8 @@ const OPERATION: u8 = 5;
 const IS_IN_WORLD: u8 = 1;
 const HAS_INTENSITIES: u8 = 2;
 const HAS_MOVING: u8 = 8;
+const HAS_COLOURS: u8 = 16;
+const HAS_CLASSES: u8 = 32;
 const HAS_STAMP: u8 = 4;
 
 impl KeptRecord {
@@ -175,6 +181,8 @@ fn write_kept(scan: &KeptRecord, out: &mut Vec<u8>) {
     let flags = [
         (is_in_world, IS_IN_WORLD),
         (scan.has_intensities, HAS_INTENSITIES),
+        (scan.has_colours, HAS_COLOURS),
+        (scan.has_classes, HAS_CLASSES),
         (scan.moving.is_some(), HAS_MOVING),
     ];
     out.push(flags.iter().map(|(is_set, flag)| if *is_set { *flag } else { 0 }).sum());
@@ -239,6 +247,8 @@ fn read_kept(input: &mut Input<'_>) -> Option<KeptRecord> {
         rays,
         points,
         has_intensities: flags & HAS_INTENSITIES != 0,
+        has_colours: flags & HAS_COLOURS != 0,
+        has_classes: flags & HAS_CLASSES != 0,
         updates,
         place: SegmentPlace { segment, offset, bytes },
         moving,
@@ -315,6 +325,8 @@ mod tests {
             rays,
             points: 12,
             has_intensities: true,
+            has_colours: true,
+            has_classes: false,
             updates: 99,
             place: SegmentPlace { segment: 3, offset: 1 << 40, bytes: 77 },
             moving: Some(KeptMarks {
@@ -326,6 +338,8 @@ mod tests {
         let in_world = KeptRecord {
             frame: KeptFrame::World([0.5; 3]),
             has_intensities: false,
+            has_colours: false,
+            has_classes: true,
             moving: None,
             stamp_ns: None,
             tiles: vec![],

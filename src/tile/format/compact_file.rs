@@ -184,7 +184,7 @@ mod tests {
         let (map_id, tile, parameters) = ([3; 16], TileIndex::new(0, 0, 0), "{}".to_owned());
         let front =
             Trailer { map_id, tile, scan_number, table_crc: 9, octree_crc: 9, octree_bytes: 9, parameters };
-        write_compact_file(&compact, front, &mut file).unwrap();
+        write_compact_file(&compact, &[], front, &mut file).unwrap();
         file
     }
 
@@ -251,6 +251,6 @@ mod tests {
     #[test]
     fn bytes_that_are_not_a_compact_table_are_rejected() {
         let front = read(&file(&table(0.5), 1)).unwrap().trailer.unwrap();
-        assert!(write_compact_file(&[1, 2, 3], front, &mut Vec::new()).is_err());
+        assert!(write_compact_file(&[1, 2, 3], &[], front, &mut Vec::new()).is_err());
     }
 }

@@ -23,7 +23,7 @@ mod renewed;
 mod trailer;
 mod writer;
 
-pub(crate) use compact::read_layer_section;
+pub use compact::read_layer_section;
 pub use compact::{CompactEffort, CompactReader, CompactWriter, read_compact, write_compact};
 pub use compact_file::{
     CompactFileIndex, read_compact_file, read_compact_front, read_compact_voxels_from, write_compact_file,

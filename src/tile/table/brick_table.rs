@@ -70,7 +70,7 @@ impl Table {
     }
 
     /// Replaces the layers.
-    pub(crate) fn set_layers(&mut self, layers: Option<LayerTable>) {
+    pub fn set_layers(&mut self, layers: Option<LayerTable>) {
         self.layers = layers.filter(|layers| !layers.is_empty()).map(Box::new);
     }
 

@@ -123,7 +123,7 @@ fn compact_tables() -> Seeds {
         let front =
             Trailer { map_id: [7; 16], tile, scan_number, table_crc, octree_crc, octree_bytes, parameters };
         let mut file = vec![choice];
-        write_compact_file(&compact_bytes(table), front, &mut file).unwrap();
+        write_compact_file(&compact_bytes(table), &[], front, &mut file).unwrap();
         file
     };
     vec![

@@ -14,7 +14,7 @@ use voxtile::space::{Grid, TileIndex, VoxelBox, VoxelKey};
 use voxtile::store::{CommitLog, Metadata};
 use voxtile::tile::Table;
 use voxtile::tile::format::{
-    CompactEffort, CompactFileIndex, TRAILER_BYTES, Trailer, read_compact, read_compact_file,
+    CompactEffort, CompactFileIndex, CompactWriter, TRAILER_BYTES, Trailer, read_compact, read_compact_file,
     read_compact_front, read_table, write_compact, write_compact_file, write_table,
 };
 use voxtile_formats::{
@@ -104,16 +104,27 @@ pub fn table(data: &[u8]) -> bool {
     let voxels = grid().voxels_of_tile(TILES[usize::from(choice >> 1 & 3)]);
     let read = |bytes: &[u8]| read_table(&mut &bytes[..], bytes.len() as u64, &voxels);
     let Ok(decoded) = read(&file) else { return false };
-    let entries = file.len() - decoded.trailer.as_ref().map_or(0, |trailer| trailer.bytes() as usize);
-    assert_eq!(entries_end(&file), Some(entries));
+    let end = entries_end(&file).expect("the header is valid");
+    let layers_at = end + decoded.trailer.as_ref().map_or(0, |trailer| trailer.bytes() as usize);
+    assert_eq!(file.len() > layers_at, decoded.table.layers().is_some());
     assert_eq!(decoded.table.iter().count(), decoded.table.len());
     if let Some(trailer) = decoded.trailer {
         let mut written = Vec::new();
-        write_table(&decoded.table, trailer.clone(), &mut written).expect("writes to memory succeed");
-        assert_eq!(written, file);
-        assert_eq!(read(&written).expect("the written file is valid").trailer, Some(trailer));
+        let layers = layer_section(&decoded.table);
+        write_table(&decoded.table, &layers, trailer.clone(), &mut written)
+            .expect("writes to memory succeed");
+        assert_eq!(written[..layers_at], file[..layers_at]);
+        let again = read(&written).expect("the written file is valid");
+        assert_eq!(again.trailer, Some(trailer));
+        assert_eq!(layer_section(&again.table), layers);
     }
     true
+}
+
+/// Returns the section of a table's layers.
+fn layer_section(table: &Table) -> Vec<u8> {
+    let mut writer = CompactWriter::new(CompactEffort::Fast).expect("there is memory");
+    writer.layer_section(table).expect("there is memory")
 }
 
 /// Returns the end of the entries of a table.
@@ -166,10 +177,12 @@ pub fn compact_file(data: &[u8]) -> bool {
     );
     let mut written = Vec::new();
     let compact = compact_bytes(&decoded.table);
-    write_compact_file(&compact, front.clone(), &mut written).expect("writes to memory succeed");
+    let layers = layer_section(&decoded.table);
+    write_compact_file(&compact, &layers, front.clone(), &mut written).expect("writes to memory succeed");
     let again = read(&written).expect("the written file is valid");
     assert!(again.table.iter().eq(decoded.table.iter()));
-    let of_content = |front: Trailer| Trailer { table_crc: 0, ..front };
+    assert_eq!(layer_section(&again.table), layers);
+    let of_content = |front: Trailer| Trailer { table_crc: 0, octree_crc: 0, octree_bytes: 0, ..front };
     assert_eq!(again.trailer.map(of_content), Some(of_content(front)));
     true
 }

@@ -33,7 +33,7 @@ mod octree {
 
 mod scan {
     pub(crate) use voxtile::scan::{
-        MovingMarks, PackedUpdates, PointBlocks, ScanPoints, ScanUpdates, TileUpdates,
+        MovingMarks, PackedUpdates, PointBlocks, PointFrame, ScanPoints, ScanUpdates, TileUpdates,
     };
 }
 

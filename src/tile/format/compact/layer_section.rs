@@ -99,7 +99,11 @@ impl Encoded {
 
 /// Reads a section of `bytes` bytes that belongs to the tile of `tile`. Damaged bytes cannot add voxels outside the
 /// tile, or take more memory than its voxels could need.
-pub(crate) fn read_layer_section(
+///
+/// # Errors
+///
+/// Fails if the section violates the format; the error contains the offset.
+pub fn read_layer_section(
     input: &mut impl Read,
     bytes: u64,
     tile: &VoxelBox,

@@ -44,7 +44,7 @@ mod writer;
 pub(super) use compact_index::CompactIndex;
 pub use effort::CompactEffort;
 pub(super) use group_index::joined_crc;
-pub(crate) use layer_section::read_layer_section;
+pub use layer_section::read_layer_section;
 pub(super) use reader::filter_compact;
 pub use reader::{CompactReader, read_compact};
 pub use writer::{CompactWriter, write_compact};

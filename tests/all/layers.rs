@@ -1,0 +1,351 @@
+//! Layers: compared with naive sums for all mappers, storages, memory limits and operations.
+
+use rayon::ThreadPoolBuilder;
+use std::collections::BTreeMap;
+use testkit::random_scans::{Random, random_scan};
+use testkit::reference_map::voxels_of;
+use testkit::unsynced_disk::UnsyncedDisk;
+use voxtile::integrity::{repair, verify};
+use voxtile::operations::{Decay, Part, Prefer, clear, convert, crop, decay, merge};
+use voxtile::scan::{OFFSETS_PER_VOXEL, ScanRef};
+use voxtile::sensor::{Iwlo, SensorModel};
+use voxtile::tile::{ClassVotes, TimeSpan};
+use voxtile::{
+    Aabb, Error, InMemoryMapper, InsertMode, Layers, MapConfig, MapPath, MapQueries, MapReader, MapView,
+    Mapper, OutOfCoreTileMapper, PointAttributes, Scan, ScanPoints, Storage, TileBox, VoxelIndex,
+    VoxelLayers,
+};
+
+/// Scan with attributes and, mostly, a time stamp.
+struct Attributed {
+    scan: Scan,
+    attributes: PointAttributes,
+    stamp_ns: Option<i64>,
+}
+
+impl Attributed {
+    fn random(random: &mut Random, points: usize) -> Self {
+        let scan = random_scan(random, [0.5; 3], points);
+        let mut attributes = PointAttributes::default();
+        let (has_colours, has_classes) = (random.below(4) > 0, random.below(4) > 0);
+        for _ in &scan.points {
+            if has_colours {
+                let colour = [0; 3].map(|_| random.below(256) as u8);
+                attributes.colours.push((random.below(8) > 0).then_some(colour));
+            }
+            if has_classes {
+                let class = [2, 2, 2, 6, 0, 255][random.below(6) as usize];
+                attributes.classes.push((random.below(8) > 0).then_some(class));
+            }
+        }
+        let stamp_ns = [None, Some(i64::MIN), Some(i64::MAX), Some(random.next() as i64 >> 8)];
+        Self { scan, attributes, stamp_ns: stamp_ns[random.below(4) as usize] }
+    }
+
+    fn points(&self) -> ScanRef<'_> {
+        let points = ScanRef::in_world(self.scan.origin, &self.scan.points);
+        let points = points.with_intensities(self.scan.intensities.as_ref().unwrap()).unwrap();
+        let points = points.with_attributes(&self.attributes).unwrap();
+        self.stamp_ns.map_or(points, |stamp_ns| points.with_stamp_ns(stamp_ns))
+    }
+}
+
+fn scans(seed: u64, count: usize, points: usize) -> Vec<Attributed> {
+    let mut random = Random(seed);
+    (0..count).map(|_| Attributed::random(&mut random, points)).collect()
+}
+
+type Naive = BTreeMap<VoxelIndex, VoxelLayers>;
+
+/// Sums over the points that hit a voxel.
+fn naive(config: &MapConfig, scans: &[Attributed]) -> Naive {
+    let mut all = Naive::new();
+    scans.iter().for_each(|scan| add(&mut all, config, scan));
+    all
+}
+
+fn add(all: &mut Naive, config: &MapConfig, Attributed { scan, attributes, stamp_ns }: &Attributed) {
+    let layers = config.layers();
+    for (number, &point) in scan.points.iter().enumerate() {
+        let intensity = scan.intensities.as_ref().unwrap()[number];
+        let is_measured = match config.sensor_model {
+            SensorModel::Iwlo(_) => {
+                !intensity.is_nan()
+                    && config.sensor_model.is_evidence(voxtile::sensor::Observation::Hit(intensity))
+            }
+            _ => true,
+        };
+        let length = (0..3).map(|k| (point[k] - scan.origin[k]).powi(2)).sum::<f64>().sqrt();
+        let is_in_range = config.rays.max_range_m.is_none_or(|max| length <= max);
+        let Some(voxel) = config.grid.voxel_of(point) else { continue };
+        let is_ray = point.iter().all(|x| x.is_finite()) && point != scan.origin && length < 1e6;
+        let is_mapped =
+            config.rays.region.is_none_or(|region| region.contains(config.grid.tile_of_voxel(voxel)));
+        if !(is_measured && is_in_range && is_ray && is_mapped) {
+            continue;
+        }
+        let of_voxel = all.entry(voxel).or_default();
+        of_voxel.points += 1;
+        if let (true, Some(Some([red, green, blue]))) = (layers.colour, attributes.colours.get(number)) {
+            of_voxel.colour.points += 1;
+            of_voxel.colour.red += u64::from(*red);
+            of_voxel.colour.green += u64::from(*green);
+            of_voxel.colour.blue += u64::from(*blue);
+        }
+        if let (Some(max), false) = (layers.intensity_max, intensity.is_nan()) {
+            let stored = (f64::from(intensity) / f64::from(max) * 65535.0).round().clamp(0.0, 65535.0) as u64;
+            of_voxel.intensity.points += 1;
+            of_voxel.intensity.sum += stored;
+            of_voxel.intensity.squares += stored * stored;
+        }
+        if let (true, Some(&Some(class))) = (layers.class, attributes.classes.get(number)) {
+            match of_voxel.classes.iter_mut().find(|votes| votes.class == class) {
+                Some(votes) => votes.votes += 1,
+                None => of_voxel.classes.push(ClassVotes { class, votes: 1 }),
+            }
+            of_voxel.classes.sort_by_key(|votes| votes.class);
+        }
+        if let (true, Some(now)) = (layers.time, *stamp_ns) {
+            let span = of_voxel.time.unwrap_or(TimeSpan { first_ns: now, last_ns: now });
+            let (first_ns, last_ns) = (span.first_ns.min(now), span.last_ns.max(now));
+            of_voxel.time = Some(TimeSpan { first_ns, last_ns });
+        }
+        if layers.shape {
+            let units = config.grid.to_voxel_units(point);
+            let edge = f64::from(OFFSETS_PER_VOXEL);
+            let offset: [i64; 3] =
+                std::array::from_fn(|k| ((units[k] - f64::from(voxel[k])) * edge).floor() as i64 - 512);
+            (0..3).for_each(|k| of_voxel.shape.offsets[k] += offset[k]);
+            for (k, (a, b)) in [(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)].into_iter().enumerate() {
+                of_voxel.shape.products[k] += offset[a] * offset[b];
+            }
+        }
+    }
+}
+
+fn layers_of(view: &impl MapView) -> Naive {
+    let mut all = Naive::new();
+    for tile in view.tiles() {
+        let tile = tile.unwrap();
+        if let Some(layers) = tile.table().layers() {
+            layers.for_each(|code, made| {
+                let voxel = tile.index_of(code);
+                assert!(tile.evidence(voxel).is_some(), "{voxel:?} was not observed");
+                assert_eq!(tile.layers_of(voxel).as_ref(), Some(&made));
+                all.insert(voxel, made);
+            });
+        }
+    }
+    all
+}
+
+fn all_layers() -> Layers {
+    Layers { colour: true, intensity_max: Some(255.0), class: true, time: true, shape: true }
+}
+
+fn config() -> MapConfig {
+    MapConfig::new(0.4, 3.2).unwrap().with_range(0.0, 5.0).with_layers(all_layers())
+}
+
+/// Each layer alone, none, and all of them with different rays, models and tiles.
+fn configs() -> Vec<MapConfig> {
+    let with = |set: fn(&mut Layers)| {
+        let mut layers = Layers::NONE;
+        set(&mut layers);
+        config().with_layers(layers)
+    };
+    let mut configs = vec![
+        with(|_| {}),
+        with(|layers| layers.colour = true),
+        with(|layers| layers.intensity_max = Some(1.0)),
+        with(|layers| layers.class = true),
+        with(|layers| layers.time = true),
+        with(|layers| layers.shape = true),
+        config().with_insert_mode(InsertMode::PerRay),
+        config().with_sensor_model(SensorModel::Iwlo(Iwlo::default())),
+        MapConfig::new(0.4, 0.8).unwrap().with_layers(all_layers()),
+        MapConfig::new(0.4, 40.0).unwrap().with_layers(all_layers()),
+    ];
+    let tile = config().grid.tile_of([0.5; 3]).unwrap();
+    configs.push(config().with_region(TileBox::new(tile, tile)));
+    configs
+}
+
+fn at(folder: &tempfile::TempDir, name: &str) -> MapPath {
+    MapPath::on(UnsyncedDisk::shared(), folder.path().join(name))
+}
+
+fn build(path: MapPath, config: &MapConfig, scans: &[Attributed]) -> OutOfCoreTileMapper {
+    let mut mapper = OutOfCoreTileMapper::create(path, config.clone()).unwrap();
+    for scan in scans {
+        mapper.insert_points(&scan.points()).unwrap();
+    }
+    mapper.flush().unwrap();
+    mapper
+}
+
+#[test]
+fn layers_equal_naive_sums_for_all_mappers() {
+    for (seed, config) in (0..).zip(configs()) {
+        let scans = scans(seed, 5, 120);
+        let mut expected = naive(&config, &scans);
+        if config.layers().is_none() {
+            expected.clear();
+        }
+        let mut in_memory = InMemoryMapper::new(config.clone()).unwrap();
+        for scan in &scans {
+            in_memory.insert_points(&scan.points()).unwrap();
+        }
+        assert!(layers_of(&in_memory) == expected, "{config:?}");
+        let digest = in_memory.layer_digest().unwrap();
+        let evidence = in_memory.digest().unwrap();
+        for (storage, bytes) in [
+            (Storage::Compact, None),
+            (Storage::OctoMap, Some(60_000)),
+            (Storage::Compact, Some(60_000)),
+            (Storage::OctoMap, Some(0)),
+        ] {
+            let folder = tempfile::tempdir().unwrap();
+            let mut config = config.clone().with_storage(storage);
+            if let Some(bytes) = bytes {
+                config = config.with_tight_memory_bytes(bytes);
+            }
+            let mapper = build(at(&folder, "map"), &config, &scans);
+            assert_eq!((mapper.layer_digest().unwrap(), mapper.digest().unwrap()), (digest, evidence));
+            drop(mapper);
+            let map = MapReader::open(at(&folder, "map"), 0).unwrap();
+            assert_eq!(map.config().layers(), config.layers());
+            assert!(layers_of(&map) == expected, "{config:?}");
+            let mut findings = Vec::new();
+            verify(at(&folder, "map"), |finding| findings.push(finding.clone()), |_, _| {}).unwrap();
+            assert!(findings.is_empty(), "{findings:?}");
+        }
+    }
+}
+
+#[test]
+fn layers_do_not_depend_on_threads_order_or_batches() {
+    let config = config();
+    let scans = scans(77, 9, 300);
+    let digest = {
+        let mut mapper = InMemoryMapper::new(config.clone()).unwrap();
+        for scan in scans.iter().rev() {
+            mapper.insert_points(&scan.points()).unwrap();
+        }
+        mapper.layer_digest().unwrap()
+    };
+    let all: Vec<_> = scans.iter().map(Attributed::points).collect();
+    let all: Vec<&dyn ScanPoints> = all.iter().map(|scan| scan as _).collect();
+    for (threads, bytes) in [(1, None), (3, None), (8, Some(40 << 20)), (2, Some(60_000))] {
+        let folder = tempfile::tempdir().unwrap();
+        let mut config = config.clone();
+        if let Some(bytes) = bytes {
+            config = config.with_tight_memory_bytes(bytes);
+        }
+        let pool = ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        let mut mapper = OutOfCoreTileMapper::create(at(&folder, "map"), config).unwrap();
+        pool.install(|| mapper.insert_all(&all, &mut Vec::new())).unwrap();
+        assert_eq!(mapper.layer_digest().unwrap(), digest, "{threads} threads, {bytes:?} bytes");
+    }
+}
+
+#[test]
+fn hits_without_rays_are_counted_once_each() {
+    let config = MapConfig::new(0.4, 3.2).unwrap().with_layers(all_layers());
+    let scans = scans(5, 2, 400);
+    let folder = tempfile::tempdir().unwrap();
+    let mut digests = Vec::new();
+    for (name, bytes) in [("whole", 1 << 30), ("parts", 40_000)] {
+        let config = config.clone().with_tight_memory_bytes(bytes);
+        let mut mapper = OutOfCoreTileMapper::create(at(&folder, name), config).unwrap();
+        for scan in &scans {
+            mapper.insert_hits(&scan.points()).unwrap();
+        }
+        mapper.flush().unwrap();
+        let points: u64 = layers_of(&mapper).values().map(|layers| layers.points).sum();
+        // All finite points in range hit, also those at the origin.
+        let hits =
+            |scan: &Attributed| scan.scan.points.iter().filter(|point| config_voxel(**point)).count() as u64;
+        assert_eq!(points, scans.iter().map(hits).sum::<u64>());
+        digests.push(mapper.layer_digest().unwrap());
+    }
+    assert_eq!(digests[0], digests[1]);
+}
+
+fn config_voxel(point: [f64; 3]) -> bool {
+    MapConfig::new(0.4, 3.2).unwrap().grid.voxel_of(point).is_some()
+}
+
+#[test]
+fn operations_keep_add_and_drop_layers() {
+    let folder = tempfile::tempdir().unwrap();
+    let scans = scans(11, 6, 200);
+    let config = config();
+    drop(build(at(&folder, "a"), &config, &scans[..4]));
+    drop(build(at(&folder, "b"), &config, &scans[4..]));
+    let open = |name: &str| MapReader::open(at(&folder, name), 0).unwrap();
+    let path = |name: &str| folder.path().join(name);
+
+    let maps = [open("a"), open("b")];
+    merge(&maps, path("sum"), None, |_, _| {}).unwrap();
+    assert!(layers_of(&open("sum")) == naive(&config, &scans));
+    let (a, b) = (layers_of(&maps[0]), layers_of(&maps[1]));
+    let evidence = maps.each_ref().map(voxels_of);
+    for (prefer, wins) in [(Prefer::First, 0), (Prefer::Last, 1)] {
+        let name = format!("preferred{wins}");
+        merge(&maps, path(&name), Some(prefer), |_, _| {}).unwrap();
+        let (first, other) = if wins == 0 { (&a, &b) } else { (&b, &a) };
+        let mut expected = first.clone();
+        let unseen = other.iter().filter(|(voxel, _)| !evidence[wins].contains_key(*voxel));
+        expected.extend(unseen.map(|(voxel, made)| (*voxel, made.clone())));
+        assert!(layers_of(&open(&name)) == expected, "{prefer:?}");
+    }
+
+    let region = Aabb { min: [-1.0, -2.0, -3.0], max: [2.0, 0.9, 1.1] };
+    let center = |voxel: &VoxelIndex| voxel.map(|k| (f64::from(k) + 0.5) * 0.4);
+    let is_in = |voxel: &VoxelIndex| {
+        let center = center(voxel);
+        (0..3).all(|k| region.min[k] <= center[k] && center[k] < region.max[k])
+    };
+    crop(&open("a"), &Part::Inside(region), path("cropped"), |_, _| {}).unwrap();
+    let expected: Naive = a.clone().into_iter().filter(|(voxel, _)| is_in(voxel)).collect();
+    assert!(layers_of(&open("cropped")) == expected);
+    clear(at(&folder, "b"), &Part::Inside(region), |_, _| {}).unwrap();
+    let expected: Naive = b.into_iter().filter(|(voxel, _)| !is_in(voxel)).collect();
+    assert!(layers_of(&open("b")) == expected);
+
+    let compact = convert(&open("a"), path("compact"), Storage::Compact, |_, _| {});
+    compact.unwrap();
+    assert!(layers_of(&open("compact")) == a);
+    let fading = Decay::new(2.0).with_scans(3).with_forget_below(0.3);
+    decay(at(&folder, "a"), &fading, |_, _| {}).unwrap();
+    let left = voxels_of(&open("a"));
+    let expected: Naive = a.into_iter().filter(|(voxel, _)| left.contains_key(voxel)).collect();
+    assert!(layers_of(&open("a")) == expected);
+}
+
+#[test]
+fn maps_state_their_layers() {
+    let folder = tempfile::tempdir().unwrap();
+    let scans = scans(3, 2, 60);
+    drop(build(at(&folder, "map"), &config(), &scans));
+    let text = std::fs::read_to_string(folder.path().join("map/metadata.json")).unwrap();
+    assert!(text.contains("\"version\": \"1.2\"") && text.contains("\"intensity_max\": 255.0"), "{text}");
+    // Without a wish the map's own layers are used; others are refused.
+    let open =
+        |layers: Option<Layers>| OutOfCoreTileMapper::open(at(&folder, "map"), config().with_layers(layers));
+    assert_eq!(open(None).unwrap().config().layers(), all_layers());
+    assert!(matches!(open(Some(Layers::NONE)), Err(Error::Mismatch { what: "layers", .. })));
+    // Its tiles have them, too.
+    let before = layers_of(&MapReader::open(at(&folder, "map"), 0).unwrap());
+    std::fs::remove_file(folder.path().join("map/metadata.json")).unwrap();
+    std::fs::remove_file(folder.path().join("map/commits.log")).unwrap();
+    repair(at(&folder, "map"), |_| {}, |_, _| {}).unwrap();
+    let map = MapReader::open(at(&folder, "map"), 0).unwrap();
+    assert_eq!(map.config().layers(), all_layers());
+    assert!(layers_of(&map) == before);
+    // A map without layers has the files of earlier versions.
+    drop(build(at(&folder, "plain"), &config().with_layers(Layers::NONE), &scans));
+    let text = std::fs::read_to_string(folder.path().join("plain/metadata.json")).unwrap();
+    assert!(text.contains("\"version\": \"1.0\"") && !text.contains("layers"), "{text}");
+}
