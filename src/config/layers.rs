@@ -1,6 +1,10 @@
 use crate::error::{Error, Result};
 use serde::{Deserialize, Serialize};
 use std::fmt;
+use std::str::FromStr;
+
+/// Largest intensity of lidars that measure it with eight bits.
+const DEFAULT_INTENSITY_MAX: f32 = 255.0;
 
 /// Layers of a map: what it stores of the points that hit a voxel, besides their evidence. A map has the same layers
 /// from its creation on.
@@ -69,6 +73,38 @@ impl Layers {
     }
 }
 
+/// Reads a list such as `colour,intensity=65535,class,time,shape`, in any order; `none` is no layer. `intensity` without
+/// a largest value means 255.
+impl FromStr for Layers {
+    type Err = Error;
+
+    fn from_str(text: &str) -> Result<Self> {
+        let mut layers = Self::NONE;
+        for name in text.split(',').map(str::trim).filter(|name| *name != "none") {
+            let (name, value) =
+                name.split_once('=').map_or((name, None), |(name, value)| (name, Some(value)));
+            match (name, value) {
+                ("colour" | "color", None) => layers.colour = true,
+                ("intensity", value) => {
+                    let max = value.map_or(Ok(DEFAULT_INTENSITY_MAX), str::parse).map_err(|_| {
+                        let reason = format!("`{text}`: the largest intensity must be a number");
+                        Error::argument("layers", reason)
+                    })?;
+                    layers.intensity_max = Some(max);
+                }
+                ("class", None) => layers.class = true,
+                ("time", None) => layers.time = true,
+                ("shape", None) => layers.shape = true,
+                _ => {
+                    let known = "colour, intensity, intensity=MAX, class, time, shape";
+                    return Err(Error::argument("layers", format!("`{name}` is no layer; known: {known}")));
+                }
+            }
+        }
+        layers.validated()
+    }
+}
+
 impl fmt::Display for Layers {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         if self.is_none() {
@@ -96,6 +132,19 @@ mod tests {
         assert_eq!([stored(0.0), stored(1.0), stored(255.0)], [Some(0), Some(257), Some(65535)]);
         assert_eq!([stored(1e9), stored(-3.0), stored(f32::INFINITY)], [Some(65535), Some(0), Some(65535)]);
         assert_eq!([stored(f32::NAN), Layers::NONE.stored_intensity(1.0)], [None, None]);
+    }
+
+    #[test]
+    fn layers_are_read_from_lists() {
+        let parsed = |text: &str| text.parse::<Layers>();
+        assert_eq!(parsed("none").unwrap(), Layers::NONE);
+        let colour_and_class = Layers { colour: true, class: true, ..Layers::NONE };
+        assert_eq!(parsed("class, color").unwrap(), colour_and_class);
+        let max = |text: &str| parsed(text).unwrap().intensity_max;
+        assert_eq!((max("intensity"), max("time,intensity=65535")), (Some(255.0), Some(65535.0)));
+        for wrong in ["", "rgb", "intensity=", "intensity=0", "intensity=nan", "class=3", "colour;class"] {
+            assert!(parsed(wrong).is_err(), "{wrong}");
+        }
     }
 
     #[test]

@@ -338,6 +338,9 @@ pub struct RaycastArgs {
 pub struct DigestArgs {
     #[arg(help = help::ANY_MAP)]
     pub map: PathBuf,
+    /// Print the digest of the layers instead of that of the evidence
+    #[arg(long)]
+    pub layers: bool,
     #[arg(long, help = help::JSON)]
     pub json: bool,
 }

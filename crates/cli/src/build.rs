@@ -64,6 +64,7 @@ fn options_of(args: &BuildArgs) -> voxtile::Result<BuildOptions> {
         InsertName::PerRay => InsertMode::PerRay,
     });
     options.clearing = args.clearing.map(Into::into);
+    options.layers = args.layers;
     options.keep_scans = args.keep_scans;
     options.region = args.region.as_deref().map(region_of).transpose()?;
     options.clear_no_return_m = args.clear_no_return;

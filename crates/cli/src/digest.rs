@@ -8,8 +8,10 @@ use voxtile_pipeline::memory;
 use voxtile_pipeline::read_any_map;
 
 pub fn run(args: &DigestArgs) -> anyhow::Result<ExitCode> {
-    let (digest, scan_number) =
-        read_any_map(&args.map, |reader| Ok((reader.digest()?, reader.scan_number())))?;
+    let (digest, scan_number) = read_any_map(&args.map, |reader| {
+        let digest = if args.layers { reader.layer_digest()? } else { reader.digest()? };
+        Ok((digest, reader.scan_number()))
+    })?;
     let mut out = std::io::stdout().lock();
     if args.json {
         let digest = digest.to_string();

@@ -11,7 +11,7 @@ use voxtile::operations::{KeptBytes, kept_bytes};
 use voxtile::sensor::SensorModel;
 use voxtile::space::{Aabb, Grid, TileBox};
 use voxtile::store::{Bounds, InputRecord, MapPath};
-use voxtile::{Clearing, MapQueries, Result, Storage};
+use voxtile::{Clearing, Layers, MapQueries, Result, Storage};
 use voxtile_pipeline::read_map;
 
 /// Maximum number of inputs in text; JSON lists all.
@@ -28,6 +28,8 @@ pub struct Info {
     pub occupancy_threshold: f64,
     /// Rule for the misses of rays.
     pub clearing: Clearing,
+    #[serde(skip_serializing_if = "Layers::is_none")]
+    pub layers: Layers,
     pub storage: Storage,
     pub scan_number: u64,
     pub flush_number: u64,
@@ -85,6 +87,7 @@ impl Info {
             sensor_model: config.sensor_model,
             occupancy_threshold: config.occupancy_threshold,
             clearing: config.rays.clearing(),
+            layers: config.layers(),
             storage: config.storage,
             scan_number: reader.scan_number(),
             flush_number: reader.flush_number(),
@@ -117,6 +120,9 @@ impl Info {
         writeln!(out, "model        {model}, occupied from probability {}", self.occupancy_threshold)?;
         if self.clearing != Clearing::Octomap {
             writeln!(out, "clearing     {}", self.clearing)?;
+        }
+        if !self.layers.is_none() {
+            writeln!(out, "layers       {}", self.layers)?;
         }
         if let Some(tiles) = self.region_tiles
             && let Ok(grid) = Grid::new(self.resolution_m, self.tile_size_m)

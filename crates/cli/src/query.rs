@@ -10,7 +10,7 @@ use voxtile::Error;
 use voxtile::mapper::MapView;
 use voxtile::space::Point;
 use voxtile_formats::read_points;
-use voxtile_pipeline::{Answer, answer_at, read_any_map};
+use voxtile_pipeline::{Answer, LayersAnswer, answer_at, read_any_map};
 
 pub fn run(args: &QueryArgs) -> anyhow::Result<ExitCode> {
     let points = match &args.points {
@@ -43,11 +43,33 @@ pub fn run(args: &QueryArgs) -> anyhow::Result<ExitCode> {
                 let log_odds = answer.log_odds.unwrap_or_default();
                 write!(out, "  probability {probability:.4}  log-odds {log_odds:.4}  {count} observations")?;
             }
+            answer.layers.iter().try_for_each(|layers| write_layers(layers, &mut out))?;
             writeln!(out)?;
         }
     }
     out.flush()?;
     Ok(ExitCode::SUCCESS)
+}
+
+/// Writes the layers of a voxel after its evidence.
+fn write_layers(layers: &LayersAnswer, out: &mut impl Write) -> std::io::Result<()> {
+    write!(out, "  {} hits", layers.points)?;
+    if let Some([red, green, blue]) = layers.colour {
+        write!(out, "  colour {red} {green} {blue}")?;
+    }
+    if let (Some(mean), Some(deviation)) = (layers.intensity, layers.intensity_deviation) {
+        write!(out, "  intensity {mean:.3} +- {deviation:.3}")?;
+    }
+    for (class, votes) in &layers.classes {
+        write!(out, "  class {class}: {votes}")?;
+    }
+    if let (Some(first), Some(last)) = (layers.first_ns, layers.last_ns) {
+        write!(out, "  hit from {:.3} to {:.3} s", first as f64 * 1e-9, last as f64 * 1e-9)?;
+    }
+    if let Some([x, y, z]) = layers.mean_m {
+        write!(out, "  mean {x:.4} {y:.4} {z:.4}")?;
+    }
+    Ok(())
 }
 
 fn points_from(path: &Path) -> anyhow::Result<Vec<Point>> {

@@ -8,7 +8,9 @@
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
-use voxtile_formats::write::{Origin, OutputFormat, OutputFormats, VoxelRow, VoxelsHead, WriteOptions};
+use voxtile_formats::write::{
+    Origin, OutputFormat, OutputFormats, RowLayers, VoxelRow, VoxelsHead, WriteOptions,
+};
 
 const TILE_VOXELS: i32 = 32;
 
@@ -54,6 +56,7 @@ fn run() -> Result<(), Box<dyn std::error::Error>> {
         resolution_m: arguments.resolution_m,
         bounds_m,
         occupied_log_odds: 0.0,
+        layers: voxtile::Layers::NONE,
     };
     let mut options = WriteOptions::for_path(&arguments.output);
     options.crs = Some(arguments.crs);
@@ -126,6 +129,7 @@ fn row(line: &str, arguments: &Arguments) -> Option<VoxelRow> {
         log_odds,
         observation_count: count.parse().ok()?,
         tile: index.map(|k| k.div_euclid(TILE_VOXELS)),
+        layers: RowLayers::default(),
     })
 }
 

@@ -15,7 +15,7 @@ use std::sync::Arc;
 use std::time::Instant;
 use voxtile::beginning_or_difference;
 use voxtile::mapper::{MapReader, MapView, Mapper, OutOfCoreTileMapper};
-use voxtile::scan::{ScanPoints, ScanReport};
+use voxtile::scan::{AttributeSet, ScanPoints, ScanReport};
 use voxtile::store::{FsDisk, InputContent, InputRecord, UnsyncedDisk};
 use voxtile::{Error, MapConfig, MapPath, MemoryLimit};
 use voxtile_formats::{PointBudget, ReadOptions, ScanFingerprint};
@@ -297,6 +297,8 @@ fn read_options(options: &BuildOptions, config: &MapConfig) -> ReadOptions {
     if let Some(bytes) = config.memory_bytes() {
         read.memory_bytes = for_reading(bytes);
     }
+    let layers = config.layers();
+    read.attributes = AttributeSet { colours: layers.colour, classes: layers.class };
     read.clouds.has_no_returns = config.rays.no_return_range_m.is_some();
     if options.no_rays && read.poses.is_none() {
         read.clouds.may_lack_poses = true;

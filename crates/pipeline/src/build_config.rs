@@ -91,6 +91,7 @@ fn for_this_run(
     let mut config =
         config.with_sensor_model(sensor_model).with_insert_mode(insert_mode).with_octree(options.octree);
     config.rays.clearing = options.clearing.or(config.rays.clearing);
+    config.layers = options.layers.or(config.layers);
     config.memory = options.memory;
     config.keeps_scans |= options.keep_scans;
     config.rays.no_return_range_m =

@@ -3,7 +3,7 @@ use crate::scan_queue::WhenBehind;
 use std::path::PathBuf;
 use std::time::Duration;
 use voxtile::space::Aabb;
-use voxtile::{Clearing, InsertMode, MemoryLimit, OctreeConfig, Storage};
+use voxtile::{Clearing, InsertMode, Layers, MemoryLimit, OctreeConfig, Storage};
 use voxtile_formats::ReadOptions;
 
 /// Sensor model, without its parameters.
@@ -54,6 +54,8 @@ pub struct BuildOptions {
     pub insert_mode: Option<InsertMode>,
     /// Rule for the voxels that rays pass. Default: the map's, OctoMap's for a new map.
     pub clearing: Option<Clearing>,
+    /// Layers of a new map. Default: none. An existing map has its own.
+    pub layers: Option<Layers>,
     /// Whether the map keeps the scans. A map that keeps scans continues to do so.
     pub keep_scans: bool,
     /// Only tiles with their center in this box are updated.
@@ -103,6 +105,7 @@ impl BuildOptions {
             intensity_max: None,
             insert_mode: None,
             clearing: None,
+            layers: None,
             keep_scans: false,
             region: None,
             clear_no_return_m: None,

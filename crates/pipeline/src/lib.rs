@@ -45,7 +45,7 @@ mod scan_reader;
 mod summary;
 mod watch;
 
-pub use answer::{Answer, answer_at};
+pub use answer::{Answer, LayersAnswer, answer_at};
 pub use build::build;
 pub use build_options::{BuildOptions, SensorModelKind};
 pub use distance_files::{layer_of, write_distances_npz, write_distances_png};

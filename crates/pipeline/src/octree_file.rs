@@ -75,6 +75,7 @@ pub fn for_each_voxel(
                 log_odds,
                 observation_count: 0,
                 tile: [0; 3],
+                layers: RowLayers::default(),
             })?;
         }
     }

@@ -9,7 +9,7 @@ use std::time::Instant;
 use voxtile::octree::OctreeFormat;
 use voxtile::query::OctreeExport;
 use voxtile::{MapQueries, MapReader, MapView};
-use voxtile_formats::write::{OutputFormats, VoxelRow, VoxelsHead, WriteOptions};
+use voxtile_formats::write::{OutputFormats, RowLayers, VoxelRow, VoxelsHead, WriteOptions};
 
 /// An export of a map in little memory.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -113,6 +113,7 @@ fn write_occupied(map: &MapReader, path: &Path) -> Result<u64> {
                 log_odds: voxel.evidence.log_odds,
                 observation_count: voxel.evidence.observation_count,
                 tile: grid.tile_of_voxel(voxel.index).to_array(),
+                layers: RowLayers::default(),
             });
         }
     })?;

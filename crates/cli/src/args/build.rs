@@ -2,7 +2,7 @@ use super::{ReadArgs, help};
 use bytesize::ByteSize;
 use clap::{Args, ValueEnum};
 use std::path::PathBuf;
-use voxtile::{Clearing, Storage};
+use voxtile::{Clearing, Layers, Storage};
 use voxtile_pipeline::{FlushEvery, WhenBehind};
 
 #[derive(Debug, Args)]
@@ -56,6 +56,11 @@ pub struct BuildArgs {
     /// Rule that selects which misses of a scan clear known voxels, for a new map [default: octomap, or the map's]
     #[arg(long, value_name = "RULE")]
     pub clearing: Option<ClearingName>,
+    /// What a new map stores of the points that hit a voxel: a list of colour, intensity, class, time and shape.
+    /// intensity=MAX sets the largest intensity, in the sensor's unit [default: none, or those of the map;
+    /// intensity=255]
+    #[arg(long, value_name = "LIST")]
+    pub layers: Option<Layers>,
     /// Keep the scans in the map, compressed to about 10 bytes per point, for remap, remove-scans and remove-points. A
     /// map that keeps scans continues to do so
     #[arg(long)]

@@ -1,8 +1,6 @@
 use super::copc_levels::{Levels, NodeKey, morton};
 use super::las::{laz_record, laz_vlr};
-use super::las_layout::{
-    COMPRESSED, LasLayout, POINT_BYTES, POINT_FORMAT, common_vlrs, not_compressed, padded, vlr,
-};
+use super::las_layout::{LasLayout, MAX_POINT_BYTES, common_vlrs, not_compressed, padded, vlr};
 use super::lattice::Lattice;
 use super::options::WriteOptions;
 use super::out_file::OutFile;
@@ -16,7 +14,7 @@ use std::io::{Read, Seek, SeekFrom};
 use std::path::PathBuf;
 
 /// Size of a record in the first sort: a 96-bit Morton code and a point.
-const CODED_BYTES: usize = 12 + POINT_BYTES;
+const CODED_BYTES: usize = 12 + MAX_POINT_BYTES;
 /// Size of a record in the second sort: a level, then a record of the first sort.
 const LEVELLED_BYTES: usize = 1 + CODED_BYTES;
 const NODE_BYTES: usize = 32;
@@ -114,14 +112,13 @@ impl VoxelSink for CopcSink {
         };
         let path = out.path().to_owned();
         let refused = |error| Error::io(&path, "write", error);
-        let laz = laz_vlr(&path, |builder, _| builder.with_variable_chunk_size(), 0)?;
+        let laz = laz_vlr(&layout, &path, |builder, _| builder.with_variable_chunk_size(), 0)?;
         let mut vlrs = vec![
             vlr("copc", 1, "COPC info VLR", cube.info(head.resolution_m, 0, 0))?,
             laz_record(&path, &laz)?,
         ];
         vlrs.extend(common);
-        let format = POINT_FORMAT | COMPRESSED;
-        layout.write_head(&mut out, format, &vlrs, None)?;
+        layout.write_head(&mut out, true, &vlrs, None)?;
 
         let mut compressor = LasZipCompressor::new(out, laz).map_err(|error| not_compressed(&path, error))?;
         compressor.reserve_offset_to_chunk_table().map_err(refused)?;
@@ -142,7 +139,9 @@ impl VoxelSink for CopcSink {
                 nodes.insert(key, Chunk { offset: place, ..Chunk::default() });
                 last = Some(key);
             }
-            compressor.compress_one(&part::<POINT_BYTES>(&record, 13)).map_err(refused)?;
+            compressor
+                .compress_one(&part::<MAX_POINT_BYTES>(&record, 13)[..layout.point_bytes()])
+                .map_err(refused)?;
             if let Some(node) = nodes.get_mut(&key) {
                 node.points += 1;
             }
@@ -170,7 +169,7 @@ impl VoxelSink for CopcSink {
         if let Some(first) = vlrs.first_mut() {
             *first = vlr("copc", 1, "COPC info VLR", info)?;
         }
-        layout.write_head(&mut out, format, &vlrs, Some(evlr))?;
+        layout.write_head(&mut out, true, &vlrs, Some(evlr))?;
         out.finish()
     }
 }

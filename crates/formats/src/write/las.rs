@@ -1,4 +1,4 @@
-use super::las_layout::{COMPRESSED, EXTRA_BYTES, LasLayout, POINT_FORMAT, common_vlrs, not_compressed, vlr};
+use super::las_layout::{EXTRA_BYTES, LasLayout, common_vlrs, not_compressed, vlr};
 use super::options::WriteOptions;
 use super::out_file::OutFile;
 use super::row::{VoxelRow, VoxelSink, VoxelsHead};
@@ -32,13 +32,13 @@ impl LasSink {
         let (layout, mut vlrs) = (LasLayout::of(head)?, common_vlrs(options)?);
         let mut out = OutFile::create(path)?;
         let points = if is_compressed {
-            let laz = laz_vlr(path, LazVlrBuilder::with_fixed_chunk_size, 50_000)?;
+            let laz = laz_vlr(&layout, path, LazVlrBuilder::with_fixed_chunk_size, 50_000)?;
             vlrs.insert(0, laz_record(path, &laz)?);
-            layout.write_head(&mut out, POINT_FORMAT | COMPRESSED, &vlrs, None)?;
+            layout.write_head(&mut out, true, &vlrs, None)?;
             let compressor = LasZipCompressor::new(out, laz).map_err(|error| not_compressed(path, error))?;
             Points::Compressed(Box::new(compressor))
         } else {
-            layout.write_head(&mut out, POINT_FORMAT, &vlrs, None)?;
+            layout.write_head(&mut out, false, &vlrs, None)?;
             Points::Plain(out)
         };
         Ok(Self { path: path.to_owned(), layout, vlrs, points })
@@ -47,11 +47,12 @@ impl LasSink {
 
 /// Returns the LASzip description of the compressed points.
 pub(super) fn laz_vlr(
+    layout: &LasLayout,
     path: &Path,
     with_chunks: fn(LazVlrBuilder, u32) -> LazVlrBuilder,
     chunk_size: u32,
 ) -> Result<LazVlr> {
-    let items = LazItemRecordBuilder::default_for_point_format_id(POINT_FORMAT, EXTRA_BYTES);
+    let items = LazItemRecordBuilder::default_for_point_format_id(layout.point_format(), EXTRA_BYTES);
     let items = items.map_err(|error| not_compressed(path, error))?;
     Ok(with_chunks(LazVlrBuilder::new(items), chunk_size).build())
 }
@@ -66,23 +67,24 @@ pub(super) fn laz_record(path: &Path, laz: &LazVlr) -> Result<::las::raw::Vlr> {
 impl VoxelSink for LasSink {
     fn put(&mut self, voxel: &VoxelRow) -> Result<()> {
         let point = self.layout.point(voxel)?;
+        let point = &point[..self.layout.point_bytes()];
         match &mut self.points {
-            Points::Plain(out) => out.write(&point),
+            Points::Plain(out) => out.write(point),
             Points::Compressed(compressor) => {
-                compressor.compress_one(&point).map_err(|error| Error::io(&self.path, "write", error))
+                compressor.compress_one(point).map_err(|error| Error::io(&self.path, "write", error))
             }
         }
     }
 
     fn finish(self: Box<Self>) -> Result<()> {
-        let (mut out, point_format) = match self.points {
-            Points::Plain(out) => (out, POINT_FORMAT),
+        let (mut out, is_compressed) = match self.points {
+            Points::Plain(out) => (out, false),
             Points::Compressed(mut compressor) => {
                 compressor.done().map_err(|error| Error::io(&self.path, "write", error))?;
-                (compressor.into_inner(), POINT_FORMAT | COMPRESSED)
+                (compressor.into_inner(), true)
             }
         };
-        self.layout.write_head(&mut out, point_format, &self.vlrs, None)?;
+        self.layout.write_head(&mut out, is_compressed, &self.vlrs, None)?;
         out.finish()
     }
 }

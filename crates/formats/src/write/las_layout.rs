@@ -1,18 +1,22 @@
 use super::options::WriteOptions;
 use super::out_file::OutFile;
-use super::row::{VoxelRow, VoxelsHead};
+use super::row::{RowLayers, VoxelRow, VoxelsHead};
 use super::{Error, FileUnit, Result};
 use ::las::raw::header::{Evlr, LargeFile};
 use ::las::raw::vlr::RecordLength;
 use ::las::raw::{Header, Vlr};
 use std::io::{Seek, SeekFrom};
+use voxtile::Layers;
 
-/// Size of a point: point format 6, log-odds as f64, number of updates as i32.
-pub(super) const POINT_BYTES: usize = 30 + EXTRA_BYTES as usize;
+/// Size of the extra bytes of a point: log-odds as f64, number of updates as i32.
 pub(super) const EXTRA_BYTES: u16 = 12;
-pub(super) const POINT_FORMAT: u8 = 6;
+/// Maximum size of a point.
+pub(super) const MAX_POINT_BYTES: usize = 36 + EXTRA_BYTES as usize;
+/// Point format, and the same with colours.
+const POINT_FORMAT: u8 = 6;
+const COLOURED_FORMAT: u8 = 7;
 /// Bit of the point format that marks compressed points.
-pub(super) const COMPRESSED: u8 = 0x80;
+const COMPRESSED: u8 = 0x80;
 /// Size of the LAS 1.4 header.
 const HEADER_BYTES: u16 = 375;
 
@@ -22,6 +26,7 @@ pub(super) struct LasLayout {
     /// A power of two. Since all offsets are integers, decoded coordinates have no additional rounding error.
     scale_m: f64,
     offset_m: [f64; 3],
+    layers: Layers,
     /// Statistics of the points converted so far.
     points: u64,
     least: [i32; 3],
@@ -50,15 +55,37 @@ impl LasLayout {
             );
             return Err(Error::argument("LAS", reason));
         }
-        Ok(Self { scale_m, offset_m, points: 0, least: [i32::MAX; 3], most: [i32::MIN; 3] })
+        Ok(Self {
+            scale_m,
+            offset_m,
+            layers: head.layers,
+            points: 0,
+            least: [i32::MAX; 3],
+            most: [i32::MIN; 3],
+        })
     }
 
-    /// Converts a voxel to a point.
+    /// Point format without the bit for compression.
+    pub(super) fn point_format(&self) -> u8 {
+        if self.layers.colour { COLOURED_FORMAT } else { POINT_FORMAT }
+    }
+
+    /// Size of a point in bytes.
+    pub(super) fn point_bytes(&self) -> usize {
+        self.standard_bytes() + usize::from(EXTRA_BYTES)
+    }
+
+    fn standard_bytes(&self) -> usize {
+        if self.layers.colour { 36 } else { 30 }
+    }
+
+    /// Converts a voxel to a point, in the first [`Self::point_bytes`] bytes. The intensity is the mean of the points,
+    /// as a share of the map's largest, or else the probability.
     ///
     /// # Errors
     ///
     /// The voxel is far outside of the bounding box.
-    pub(super) fn point(&mut self, voxel: &VoxelRow) -> Result<[u8; POINT_BYTES]> {
+    pub(super) fn point(&mut self, voxel: &VoxelRow) -> Result<[u8; MAX_POINT_BYTES]> {
         let mut position = [0; 3];
         for (k, whole) in position.iter_mut().enumerate() {
             let scaled = ((voxel.center_m[k] - self.offset_m[k]) / self.scale_m).round();
@@ -71,16 +98,26 @@ impl LasLayout {
             self.most[k] = self.most[k].max(*whole);
         }
         self.points += 1;
-        let mut point = [0; POINT_BYTES];
+        let mut point = [0; MAX_POINT_BYTES];
         let [x, y, z] = position.map(i32::to_le_bytes);
         point[..12].copy_from_slice([x, y, z].as_flattened());
-        let intensity = (voxel.probability.clamp(0.0, 1.0) * 65535.0).round() as u16;
+        let RowLayers { colour, stored_intensity, class, .. } = voxel.layers;
+        let intensity = match self.layers.intensity_max {
+            Some(_) => stored_intensity.unwrap_or_default(),
+            None => (voxel.probability.clamp(0.0, 1.0) * 65535.0).round() as u16,
+        };
         point[12..14].copy_from_slice(&intensity.to_le_bytes());
-        // First of one return; classification "created, never classified".
+        // First of one return; without a class "created, never classified".
         point[14] = 0x11;
-        point[16] = 1;
-        point[30..38].copy_from_slice(&voxel.log_odds.to_le_bytes());
-        point[38..42].copy_from_slice(&voxel.observation_count.to_le_bytes());
+        point[16] = class.unwrap_or(1);
+        if self.layers.colour {
+            // 16 bits per channel.
+            let colour = colour.unwrap_or_default().map(|channel| (257 * u16::from(channel)).to_le_bytes());
+            point[30..36].copy_from_slice(colour.as_flattened());
+        }
+        let extra = self.standard_bytes();
+        point[extra..extra + 8].copy_from_slice(&voxel.log_odds.to_le_bytes());
+        point[extra + 8..extra + 12].copy_from_slice(&voxel.observation_count.to_le_bytes());
         Ok(point)
     }
 
@@ -88,7 +125,7 @@ impl LasLayout {
     pub(super) fn write_head(
         &self,
         out: &mut OutFile,
-        point_format: u8,
+        is_compressed: bool,
         vlrs: &[Vlr],
         evlr_start: Option<u64>,
     ) -> Result<()> {
@@ -108,8 +145,8 @@ impl LasLayout {
             header_size: HEADER_BYTES,
             offset_to_point_data: u32::from(HEADER_BYTES) + vlr_bytes as u32,
             number_of_variable_length_records: vlrs.len() as u32,
-            point_data_record_format: point_format,
-            point_data_record_length: POINT_BYTES as u16,
+            point_data_record_format: self.point_format() | if is_compressed { COMPRESSED } else { 0 },
+            point_data_record_length: self.point_bytes() as u16,
             x_scale_factor: self.scale_m,
             y_scale_factor: self.scale_m,
             z_scale_factor: self.scale_m,

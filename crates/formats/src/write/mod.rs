@@ -65,5 +65,5 @@ pub use options::WriteOptions;
 pub use output_format::{OpenFiles, OpenStream, Origin, OutputFormat, OutputOption, Writer};
 pub use pcd::PCD_REACH_VOXELS;
 pub use registry::OutputFormats;
-pub use row::{VoxelRow, VoxelSink, VoxelsHead};
+pub use row::{RowLayers, VoxelRow, VoxelSink, VoxelsHead};
 use voxtile::{Error, Result};

@@ -101,6 +101,7 @@ mod tests {
             resolution_m: 0.5,
             bounds_m: [[0.0; 3], [1.0; 3]],
             occupied_log_odds: 0.0,
+            layers: voxtile::Layers::NONE,
         };
         let zip = ZipStore::create(&path).unwrap().with_zip64_from(zip64_from);
         let mut sink = Box::new(NpzSink::in_zip(zip, &head, &WriteOptions::for_path(&path)).unwrap());
@@ -112,6 +113,7 @@ mod tests {
                 log_odds: 0.85,
                 observation_count: 3,
                 tile: [0; 3],
+                layers: super::super::RowLayers::default(),
             };
             sink.put(&voxel).unwrap();
         }

@@ -1,4 +1,5 @@
 use super::Result;
+use voxtile::{Layers, VoxelLayers};
 
 /// Voxel to write.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -15,6 +16,38 @@ pub struct VoxelRow {
     pub observation_count: i32,
     /// Index of its tile; 0 0 0 if there are no tiles.
     pub tile: [i32; 3],
+    /// Layers of the voxel.
+    pub layers: RowLayers,
+}
+
+/// Layers of a voxel, as files store them.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct RowLayers {
+    /// Mean colour.
+    pub colour: Option<[u8; 3]>,
+    /// Mean intensity in the unit of the points.
+    pub intensity: Option<f64>,
+    /// Mean intensity as a share of the largest, 0 to 65535.
+    pub stored_intensity: Option<u16>,
+    /// Class of most points.
+    pub class: Option<u8>,
+    /// Time stamps of the first and last scan with a hit, in nanoseconds.
+    pub time_ns: Option<[i64; 2]>,
+}
+
+impl RowLayers {
+    /// Converts the layers of a voxel.
+    pub fn of(made: &VoxelLayers, layers: &Layers) -> Self {
+        let intensity = made.mean_intensity(layers);
+        let max = f64::from(layers.intensity_max.unwrap_or(1.0));
+        Self {
+            colour: made.mean_colour(),
+            intensity,
+            stored_intensity: intensity.map(|mean| (mean / max * f64::from(u16::MAX)).round() as u16),
+            class: made.class(),
+            time_ns: made.time.map(|time| [time.first_ns, time.last_ns]),
+        }
+    }
 }
 
 /// Properties of a file that are needed before its first voxel.
@@ -28,12 +61,14 @@ pub struct VoxelsHead {
     pub bounds_m: [[f64; 3]; 2],
     /// Minimum log-odds of an occupied voxel. The probability is not sufficient: decayed log-odds can give exactly 0.5.
     pub occupied_log_odds: f64,
+    /// Layers of the map.
+    pub layers: Layers,
 }
 
 impl VoxelsHead {
-    /// Creates the head for a stream format, which ignores the bounding box and the occupancy threshold.
+    /// Creates the head for a stream format, which ignores the bounding box and the occupancy threshold, without layers.
     pub fn of_stream(voxels: u64, resolution_m: f64) -> Self {
-        Self { voxels, resolution_m, bounds_m: [[0.0; 3]; 2], occupied_log_odds: 0.0 }
+        Self { voxels, resolution_m, bounds_m: [[0.0; 3]; 2], occupied_log_odds: 0.0, layers: Layers::NONE }
     }
 }
 

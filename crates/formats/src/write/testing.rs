@@ -1,6 +1,7 @@
 //! Voxels of 0.5 m for tests.
 
-use super::row::{VoxelRow, VoxelsHead};
+use super::row::{RowLayers, VoxelRow, VoxelsHead};
+use voxtile::Layers;
 
 pub(super) const RESOLUTION_M: f64 = 0.5;
 
@@ -12,6 +13,7 @@ pub(super) fn row(index: [i32; 3], probability: f64) -> VoxelRow {
         log_odds: (probability / (1.0 - probability)).ln(),
         observation_count: 4,
         tile: index.map(|k| k.div_euclid(16)),
+        layers: RowLayers::default(),
     }
 }
 
@@ -22,5 +24,6 @@ pub(super) fn head_of(rows: &[VoxelRow]) -> VoxelsHead {
         resolution_m: RESOLUTION_M,
         bounds_m: [f64::min, f64::max].map(|pick| std::array::from_fn(|k| bound(k, pick).unwrap_or(0.0))),
         occupied_log_odds: 0.0,
+        layers: Layers::NONE,
     }
 }

@@ -1,6 +1,6 @@
 use std::fs;
 use std::path::Path;
-use voxtile_formats::write::{OutputFormat, OutputFormats, VoxelRow, VoxelsHead, WriteOptions};
+use voxtile_formats::write::{OutputFormat, OutputFormats, RowLayers, VoxelRow, VoxelsHead, WriteOptions};
 
 /// Number of voxels written by [`write_voxels`].
 pub const VOXELS: i32 = 30;
@@ -15,6 +15,7 @@ pub fn voxel(k: i32) -> VoxelRow {
         log_odds: 2.0,
         observation_count: k,
         tile: [0; 3],
+        layers: RowLayers::default(),
     }
 }
 
@@ -32,6 +33,7 @@ pub fn write_voxels(format: &str, path: &Path, crs: Option<&str>) {
         resolution_m: 0.5,
         bounds_m: [bound(f64::min), bound(f64::max)],
         occupied_log_odds: 0.0,
+        layers: voxtile::Layers::NONE,
     };
     let options = WriteOptions { crs: crs.map(str::to_owned), ..WriteOptions::for_path(path) };
     let mut sink = format_of(format).open(&head, path, &options).unwrap();

@@ -8,7 +8,14 @@ use voxtile::sensor::Probabilities;
 use voxtile::space::{Aabb, Point, TileIndex, VoxelIndex};
 use voxtile::tile::Voxel;
 use voxtile::{MapQueries, Result};
-use voxtile_formats::write::VoxelRow;
+use voxtile_formats::write::{RowLayers, VoxelRow};
+
+/// Whether voxels are passed with their layers.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum WithLayers {
+    Yes,
+    No,
+}
 
 /// Selection of voxels.
 pub(super) struct Chosen {
@@ -69,10 +76,14 @@ impl Chosen {
         &self,
         map: &impl MapView,
         gauge: &dyn Gauge,
+        with_layers: WithLayers,
         center_m: impl Fn(VoxelIndex) -> Point,
         mut visit: impl FnMut(&VoxelRow) -> Result<()>,
     ) -> Result<()> {
         let grid = map.config().grid;
+        let layers = map.config().layers();
+        let has_layers = with_layers == WithLayers::Yes && !layers.is_none();
+        let mut of_tile = None;
         let mut tiles = Tiles { all: map.tile_indices(), done: 0, now: None, gauge };
         let mut probabilities = Probabilities::default();
         let (failed, mut outcome) = (Stop::default(), Ok(()));
@@ -81,7 +92,17 @@ impl Chosen {
                 return;
             }
             let tile = grid.tile_of_voxel(index);
-            tiles.reach(tile);
+            if tiles.reach(tile) && has_layers {
+                of_tile = match map.tile_uncached(tile) {
+                    Ok(found) => found,
+                    Err(error) => {
+                        outcome = Err(error);
+                        failed.set();
+                        return;
+                    }
+                };
+            }
+            let of_voxel = of_tile.as_ref().and_then(|tile| tile.layers_of(index));
             outcome = visit(&VoxelRow {
                 index,
                 center_m: center_m(index),
@@ -89,6 +110,7 @@ impl Chosen {
                 log_odds: evidence.log_odds,
                 observation_count: evidence.observation_count,
                 tile: tile.to_array(),
+                layers: of_voxel.map_or(RowLayers::default(), |made| RowLayers::of(&made, &layers)),
             });
             if outcome.is_err() {
                 failed.set();
@@ -110,10 +132,13 @@ struct Tiles<'a> {
 }
 
 impl Tiles<'_> {
-    fn reach(&mut self, tile: TileIndex) {
-        if self.now.replace(tile) != Some(tile) {
+    /// Notes the tile of the current voxel; returns whether it is another one than before.
+    fn reach(&mut self, tile: TileIndex) -> bool {
+        let is_next = self.now.replace(tile) != Some(tile);
+        if is_next {
             self.pass(self.all.partition_point(|other| *other <= tile));
         }
+        is_next
     }
 
     fn pass(&mut self, count: usize) {

@@ -1,4 +1,4 @@
-use super::chosen::Chosen;
+use super::chosen::{Chosen, WithLayers};
 use super::run::Export;
 use super::summary::{ExportSummary, Written};
 use crate::output::StagedOutput;
@@ -39,7 +39,7 @@ pub(super) fn export(export: &Export<'_>) -> anyhow::Result<ExportSummary> {
             std::array::from_fn(|k| in_file(center_m[k] - origin_m[k]))
         };
         let gauge = watch.over_tiles(map.tile_indices().len());
-        chosen.for_each(map, &*gauge, center_m, |row| sink.put(row))?;
+        chosen.for_each(map, &*gauge, WithLayers::Yes, center_m, |row| sink.put(row))?;
         sink.finish()?;
         drop(gauge);
         watch.stop().check()?;
@@ -58,11 +58,13 @@ fn head_of(chosen: &Chosen, map: &impl MapView) -> Result<VoxelsHead> {
         resolution_m: grid.resolution_m(),
         bounds_m: [[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]],
         occupied_log_odds: map.config().occupied_log_odds(),
+        layers: map.config().layers(),
     };
     let gauge = Watch::silent().over_tiles(0);
     chosen.for_each(
         map,
         &*gauge,
+        WithLayers::No,
         |voxel| grid.center_m(voxel),
         |row| {
             head.voxels += 1;

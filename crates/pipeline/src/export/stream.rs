@@ -1,14 +1,14 @@
-use super::chosen::Chosen;
+use super::chosen::{Chosen, WithLayers};
 use super::moved_file::MovedFile;
 use super::origin::ExportOrigin;
 use super::run::Export;
 use super::summary::ExportSummary;
 use crate::{octree_file, read_map};
 use std::io::Write;
-use voxtile::Result;
 use voxtile::mapper::{MapReader, MapView, OctreeMap, Stoppable};
 use voxtile::octree::OctreeFile;
 use voxtile::space::{Aabb, Grid, TileIndex, VoxelBox};
+use voxtile::{Layers, Result};
 use voxtile_formats::write::{Origin, VoxelRow, VoxelSink, VoxelsHead, WriteOptions};
 
 /// Writes voxels as one stream of bytes.
@@ -28,10 +28,12 @@ fn of_map(export: &Export<'_>, file: &MovedFile<'_>, reader: &MapReader) -> anyh
     let voxels = chosen.count(reader, stop)?;
     file.write(&origin, &grid, |out| {
         let gauge = export.watch.over_tiles(tiles.len());
-        let mut sink = open(export, voxels, &grid, &origin, out)?;
+        let layers = reader.config().layers();
+        let mut sink = open(export, voxels, layers, &grid, &origin, out)?;
         chosen.for_each(
             &Stoppable::new(reader, stop),
             &*gauge,
+            WithLayers::Yes,
             |voxel| origin.center_m(voxel, &grid),
             |row| sink.put(row),
         )?;
@@ -56,7 +58,7 @@ fn of_octree(
     };
     let voxels = octree_file::count_voxels(octree, min_log_odds, is_chosen)?;
     file.write(&origin, &grid, |out| {
-        let mut sink = open(export, voxels, &grid, &origin, out)?;
+        let mut sink = open(export, voxels, Layers::NONE, &grid, &origin, out)?;
         octree_file::for_each_voxel(octree, min_log_odds, |voxel| {
             if is_chosen(voxel) {
                 let center_m = origin.center_m(voxel.index, &grid);
@@ -72,11 +74,12 @@ fn of_octree(
 fn open<'a>(
     export: &Export<'_>,
     voxels: u64,
+    layers: Layers,
     grid: &Grid,
     origin: &ExportOrigin,
     out: &'a mut dyn Write,
 ) -> Result<Box<dyn VoxelSink + 'a>> {
-    let head = VoxelsHead::of_stream(voxels, grid.resolution_m());
+    let head = VoxelsHead { layers, ..VoxelsHead::of_stream(voxels, grid.resolution_m()) };
     let mut options = WriteOptions::for_path(&export.options.output);
     options.origin_m = origin.corner_m;
     export.format.open_stream(&head, out, &options)

@@ -11,7 +11,7 @@ use std::path::Path;
 use std::sync::atomic::{AtomicU64, Ordering};
 use voxtile::mapper::MapView;
 use voxtile::{Error, Result};
-use voxtile_formats::write::{OutputFormat, VoxelRow, VoxelsHead, WriteOptions};
+use voxtile_formats::write::{OutputFormat, RowLayers, VoxelRow, VoxelsHead, WriteOptions};
 use voxtile_render::levels::{Levels, LevelsOf, NodeKey, NodeStore, TilesetContent, subtree, tileset};
 
 /// Numbers of nodes and voxels written.
@@ -115,6 +115,7 @@ impl Tileset<'_> {
             resolution_m: edge_m,
             bounds_m: [[0.0; 3]; 2],
             occupied_log_odds: 0.0,
+            layers: voxtile::Layers::NONE,
         };
         let mut options = WriteOptions::for_path(&path);
         // Coordinates are relative to the node's corner.
@@ -130,6 +131,7 @@ impl Tileset<'_> {
                 log_odds: 0.0,
                 observation_count: 0,
                 tile: [0; 3],
+                layers: RowLayers::default(),
             })?;
         }
         sink.finish()?;
