@@ -12,6 +12,7 @@
 //! `spill/` holds temporary files for data that exceeds the memory budget. The features `las`, `e57`, `ros` and
 //! `sqlite` enable formats with many dependencies.
 
+mod class_selection;
 mod crs_codes;
 mod guess;
 mod input_format;
@@ -27,6 +28,7 @@ mod scans;
 mod spill;
 pub mod write;
 
+pub use class_selection::{ClassSelection, Returns};
 pub use crs_codes::epsg_code;
 pub use input_format::{Detection, InputFormat, Open, OpenCloud, OpenClouds, OpenScans};
 pub use open::{open_clouds, open_scans};

@@ -1,4 +1,5 @@
 use crate::CloudSource;
+use crate::class_selection::Returns;
 use crate::input_format::{Detection, InputFormat, Open};
 use crate::poses::PoseSource;
 use crate::poses::PosedClouds;
@@ -8,6 +9,7 @@ use crate::read::files::Files;
 use crate::read::from_origin::FromOrigin;
 use crate::read::listing::Listing;
 use crate::read::name_stamps::NameStamps;
+use crate::read::of_classes::{OfClasses, without_classes};
 use crate::read::one::OneCloud;
 use crate::read::open_input;
 use crate::read::regular::check_regular;
@@ -54,10 +56,14 @@ impl Registry {
     fn open_unguarded(&self, path: &Path, options: &ReadOptions) -> Result<Box<dyn ScanSource + Send>> {
         let (path, format) = self.find(path, options)?;
         let has_poses = (format.has_poses)(&path);
+        check_returns(&path, format, options)?;
         let scans = match format.open {
             Open::Scans(_) if has_poses && options.poses.is_some() => {
                 let reason = format!("a {} has its own poses; omit the option", format.title);
                 return Err(Error::argument("poses", reason));
+            }
+            Open::Scans(_) if format.name != "pcd" && !options.classes.is_everything() => {
+                return Err(without_classes(&format!("{} ({})", path.display(), format.title)));
             }
             Open::Scans(open) => open(&path, options)?,
             _ => {
@@ -78,6 +84,7 @@ impl Registry {
     /// As for [`open_clouds`].
     pub fn open_clouds(&self, path: &Path, options: &ReadOptions) -> Result<Box<dyn CloudSource>> {
         let (path, format) = self.find(path, options)?;
+        check_returns(&path, format, options)?;
         open_as(&path, format, options)
     }
 }
@@ -87,7 +94,7 @@ fn open_as(path: &Path, format: &InputFormat, options: &ReadOptions) -> Result<B
     let wrong = |reason: String| Err(Error::argument(path.display().to_string(), reason));
     let is_folder = path.is_dir();
     let source = match format.open {
-        Open::Recording(open) => return open(path, options),
+        Open::Recording(open) => return Ok(OfClasses::of(open(path, options)?, options)),
         Open::Scans(_) => {
             return wrong(format!("is {}, which contains scans with poses: open it as scans", format.title));
         }
@@ -102,10 +109,24 @@ fn open_as(path: &Path, format: &InputFormat, options: &ReadOptions) -> Result<B
         _ if is_folder => open_folder(path, *format, options)?,
         _ => open_file(path, format, NameStamps::default(), options)?,
     };
-    Ok(match options.sensor_origin_m {
+    let source = match options.sensor_origin_m {
         Some(origin_m) => Box::new(FromOrigin::new(source, origin_m)?),
         None => source,
-    })
+    };
+    Ok(OfClasses::of(source, options))
+}
+
+/// Checks that the points of a format have numbers of returns, if returns are selected.
+pub(crate) fn check_returns(path: &Path, format: &InputFormat, options: &ReadOptions) -> Result<()> {
+    if options.returns == Returns::All || matches!(format.name, "las" | "laz" | "copc") {
+        return Ok(());
+    }
+    let reason = format!(
+        "{} is {}, which does not number the returns of a pulse as LAS files do: omit the option for this input",
+        path.display(),
+        format.title
+    );
+    Err(Error::argument("returns", reason))
 }
 
 pub(crate) fn check(options: &ReadOptions) -> Result<()> {

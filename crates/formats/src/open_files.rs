@@ -2,7 +2,7 @@
 
 use crate::CloudSource;
 use crate::input_format::{InputFormat, Open};
-use crate::open::{check, open_file};
+use crate::open::{check, check_returns, open_file};
 use crate::poses::{PoseSource, PosedClouds, Rules, find_poses};
 use crate::read::companions::is_surely_named;
 use crate::read::file_order::{name_of, sort_naturally};
@@ -10,6 +10,7 @@ use crate::read::files::Files;
 use crate::read::from_origin::FromOrigin;
 use crate::read::listing::extension_of;
 use crate::read::name_stamps::NameStamps;
+use crate::read::of_classes::OfClasses;
 use crate::read::regular::check_regular;
 use crate::read::{open_input, pcd_scans};
 use crate::read_options::ReadOptions;
@@ -97,6 +98,7 @@ impl Registry {
             let reason = "is no file of clouds: open it alone";
             return Err(Error::argument(first.display().to_string(), reason));
         };
+        check_returns(first, format, options)?;
         let scans = GuardedScans::open(first, || open_list(paths, first, format, options))?;
         Ok(options.selection.clone().of(scans))
     }
@@ -179,6 +181,7 @@ fn open_list(
         Open::Recording(_) => open_parts(paths, options)?,
         _ => open_clouds(paths, *format, remark, options)?,
     };
+    let clouds = OfClasses::of(clouds, options);
     let own = ((format.has_poses)(first) || options.sensor_origin_m.is_some()).then_some(PoseSource::Scans);
     let poses = find_poses(folder, own, clouds.len_hint(), false, Rules::Strict, options)?;
     Ok(Box::new(PosedClouds::new(clouds, folder, poses, options.clouds.clone())?))

@@ -1,8 +1,10 @@
 use crate::Budget;
+use crate::class_selection::{ClassSelection, Returns};
 use crate::poses::CloudOptions;
 use crate::read::Intrinsics;
 use crate::scans::Selection;
 use std::path::PathBuf;
+use voxtile::scan::AttributeSet;
 
 /// Settings for reading an input; see [`open_scans`](super::open_scans).
 #[derive(Clone, Debug)]
@@ -36,6 +38,12 @@ pub struct ReadOptions {
     pub clouds: CloudOptions,
     /// Selection of scans and points.
     pub selection: Selection,
+    /// Attributes of points to read, for the layers of a map. Intensities are always read.
+    pub attributes: AttributeSet,
+    /// Selection of points by class.
+    pub classes: ClassSelection,
+    /// Returns of LAS files to read.
+    pub returns: Returns,
     /// Memory budget in bytes for data that grows with the input. Data beyond it goes to temporary files.
     pub memory_bytes: usize,
     /// Folder for temporary files. `None`: the system's.
@@ -46,6 +54,12 @@ impl ReadOptions {
     /// Returns the memory budget and the folder for temporary files.
     pub fn budget(&self) -> Budget {
         Budget { bytes: self.memory_bytes, scratch: self.scratch.clone() }
+    }
+
+    /// Returns the attributes that readers need: the wanted ones, and classes to select by.
+    pub(crate) fn attributes_to_read(&self) -> AttributeSet {
+        let AttributeSet { colours, classes } = self.attributes;
+        AttributeSet { colours, classes: classes || !self.classes.is_everything() }
     }
 
     /// Returns all files that are not clouds, including those named in other options.
@@ -71,6 +85,9 @@ impl Default for ReadOptions {
             calib: None,
             clouds: CloudOptions::default(),
             selection: Selection::default(),
+            attributes: AttributeSet::NONE,
+            classes: ClassSelection::default(),
+            returns: Returns::default(),
             memory_bytes: Budget::DEFAULT_BYTES,
             scratch: None,
         }

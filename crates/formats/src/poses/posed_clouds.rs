@@ -247,10 +247,10 @@ impl PosedClouds {
             };
             Deskew::new(stamp_ns, &sensor, pose_at)
         });
-        points.begin(head.has_intensities);
+        points.begin_with(head.has_intensities, head.attributes);
         let origin = if is_in_world { sensor.position_m } else { [0.0; 3] };
         let read = source.read_points(&mut |point| {
-            let CloudPoint { position_m, intensity, is_return, .. } = point;
+            let CloudPoint { position_m, intensity, is_return, colour, class, .. } = point;
             let place = match is_return {
                 true => deskew.as_mut().map_or(position_m, |deskew| deskew.apply(&point)),
                 false if options.has_no_returns => {
@@ -261,14 +261,14 @@ impl PosedClouds {
                         .all(|c| c.is_finite())
                         .then(|| no_return([0.0; 3], direction))
                         .flatten();
-                    return points.push(far.unwrap_or([f64::NAN; 3]), intensity);
+                    return points.push_with(far.unwrap_or([f64::NAN; 3]), intensity, colour, class);
                 }
                 // Move the point to the sensor position, so that it is dropped later.
                 false => origin,
             };
             let in_sensor: Point = std::array::from_fn(|k| place[k] - origin[k]);
             let in_sensor = if is_in_world { in_sensor } else { place };
-            points.push(in_sensor, intensity)
+            points.push_with(in_sensor, intensity, colour, class)
         });
         self.stayed += deskew.map_or(0, |deskew| deskew.stayed());
         read?;

@@ -1,5 +1,6 @@
 use crate::poses::RigidPose;
 use voxtile::Result;
+use voxtile::scan::AttributeSet;
 
 /// Properties of a cloud that are known before its points are read.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -22,6 +23,8 @@ pub struct CloudHead {
     pub has_intensities: bool,
     /// Whether points have individual times.
     pub has_times: bool,
+    /// Which of the requested attributes points have.
+    pub attributes: AttributeSet,
 }
 
 /// Point of a cloud.
@@ -33,14 +36,18 @@ pub struct CloudPoint {
     pub intensity: f32,
     /// Time of the measurement, in seconds after the stamp of the cloud; 0 if unknown.
     pub time_s: f64,
+    /// Red, green and blue; `None` if the point has no colour or none was requested.
+    pub colour: Option<[u8; 3]>,
+    /// Class; `None` if the point has none or none was requested.
+    pub class: Option<u8>,
     /// Whether the ray hit a surface. Otherwise `position_m` only gives the direction of the ray.
     pub is_return: bool,
 }
 
 impl CloudPoint {
-    /// Creates a return without intensity and time.
+    /// Creates a return without intensity, time and attributes.
     pub fn hit(position_m: [f64; 3]) -> Self {
-        Self { position_m, intensity: 0.0, time_s: 0.0, is_return: true }
+        Self { position_m, intensity: 0.0, time_s: 0.0, colour: None, class: None, is_return: true }
     }
 }
 

@@ -229,10 +229,10 @@ impl Clock {
         let position_m = [in_x.metres(x), in_y.metres(y), in_z.metres(z)];
         let time = meaning.time.zip(time);
         CloudPoint {
-            position_m,
             intensity: intensity.unwrap_or_default() as f32,
             time_s: time.map_or(0.0, |(column, time)| self.relative_s(time * column.unit_s)),
             is_return: position_m.iter().all(|coordinate| coordinate.is_finite()),
+            ..CloudPoint::hit(position_m)
         }
     }
 }

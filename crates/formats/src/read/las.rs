@@ -1,8 +1,10 @@
-use super::cloud::{CloudHead, CloudPoint, CloudSource};
+use super::cloud::{CloudHead, CloudSource};
+use super::las_colours::LasColours;
 use super::las_count::settle;
 use super::las_hints::hints;
 use super::las_layout::Layout;
 use super::las_points::LasPoints;
+use super::las_record::{ATTRIBUTED_BYTES, PLAIN_BYTES};
 use super::las_scans::LasScans;
 use super::las_units::Units;
 use super::laz_chunks::Chunks;
@@ -29,16 +31,26 @@ pub(crate) fn open(path: &Path, options: &ReadOptions) -> Result<Box<dyn CloudSo
     let mut units = Units::of(&layout);
     units.remarks.extend(hints(&layout, &units));
     units.remarks.append(&mut layout.remarks);
-    let points = LasPoints::open(path, &layout, chunks, &units)?;
+    let colour_chunks = if options.attributes.colours { chunks.clone() } else { None };
+    let mut points = LasPoints::open(path, &layout, chunks, &units, options)?;
+    if options.attributes.colours && points.has_colours() {
+        points.set_colours(LasColours::find(path, &layout, colour_chunks, &units, options)?);
+    }
     let format = if layout.is_compressed { "LAZ" } else { "LAS" }.to_owned();
     let is_cut = points.has_times() && options.scan_period_s > 0.0 && options.sensor_origin_m.is_none();
     if is_cut {
-        return Ok(Box::new(LasScans::new(format, path, &layout, units, points, options)));
+        return Ok(match points.attributes().is_none() {
+            true => Box::new(LasScans::<PLAIN_BYTES>::new(format, path, &layout, units, points, options)),
+            false => {
+                Box::new(LasScans::<ATTRIBUTED_BYTES>::new(format, path, &layout, units, points, options))
+            }
+        });
     }
     let head = CloudHead {
         points: Some(layout.points),
         fields: fields(points.has_times()),
         has_intensities: true,
+        attributes: points.attributes(),
         ..head_of(path)
     };
     Ok(Box::new(WholeLas { format, units, head: Some(head), points, is_read: false }))
@@ -79,10 +91,8 @@ impl CloudSource for WholeLas {
             return Ok(());
         }
         self.is_read = true;
-        self.points.visit(&mut |point| {
-            let intensity = f32::from(point.intensity);
-            visit(CloudPoint { intensity, ..CloudPoint::hit(point.position_m) })
-        })
+        let attributes = self.points.attributes();
+        self.points.visit(&mut |point| visit(point.cloud_point(attributes)))
     }
 
     fn remarks(&self) -> Vec<String> {

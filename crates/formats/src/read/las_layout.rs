@@ -31,6 +31,8 @@ pub(super) struct PointFormat {
     /// Formats 6 and above have wider flags.
     pub(super) is_extended: bool,
     pub(super) time_at: Option<usize>,
+    /// Offset of red, green and blue.
+    pub(super) colour_at: Option<usize>,
 }
 
 /// Sizes of the LAS 1.4 and LAS 1.5 headers.
@@ -184,7 +186,13 @@ impl PointFormat {
             1 | 3..=5 => Some(20),
             _ => Some(22),
         };
-        Self { is_extended: id >= 6, time_at }
+        let colour_at = match id {
+            2 => Some(20),
+            3 | 5 => Some(28),
+            7 | 8 | 10 => Some(30),
+            _ => None,
+        };
+        Self { is_extended: id >= 6, time_at, colour_at }
     }
 }
 

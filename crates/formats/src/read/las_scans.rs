@@ -1,21 +1,24 @@
 use super::cloud::{CloudHead, CloudPoint, CloudSource};
 use super::las_layout::Layout;
 use super::las_points::{LasPoint, LasPoints};
+use super::las_record::LasRecord;
 use super::las_units::Units;
 use super::one::Visit;
 use crate::read_options::ReadOptions;
 use crate::spill::{Sorted, Sorter};
 use std::path::{Path, PathBuf};
+use voxtile::scan::AttributeSet;
 use voxtile::{Error, FormatError, Result};
 
 /// Source that splits a LAS file into scans of equal duration by GPS time.
-pub(super) struct LasScans {
+pub(super) struct LasScans<const RECORD_BYTES: usize> {
     format: String,
     path: PathBuf,
     units: Units,
+    attributes: AttributeSet,
     /// Unsorted points, until the first scan is requested.
-    unsorted: Option<(LasPoints, Sorter<LasPoint>)>,
-    sorted: Option<Sorted<LasPoint>>,
+    unsorted: Option<(LasPoints, Sorter<LasRecord<RECORD_BYTES>>)>,
+    sorted: Option<Sorted<LasRecord<RECORD_BYTES>>>,
     period_s: f64,
     zero_ns: i64,
     first_s: f64,
@@ -29,7 +32,7 @@ pub(super) struct LasScans {
     failure: Option<Error>,
 }
 
-impl LasScans {
+impl<const RECORD_BYTES: usize> LasScans<RECORD_BYTES> {
     pub(super) fn new(
         format: String,
         path: &Path,
@@ -43,6 +46,7 @@ impl LasScans {
             format,
             path: path.to_owned(),
             units,
+            attributes: points.attributes(),
             unsorted: Some((points, sorter)),
             sorted: None,
             period_s: options.scan_period_s,
@@ -72,7 +76,7 @@ impl LasScans {
                 return Ok(());
             }
             (least, most) = (least.min(point.time_s), most.max(point.time_s));
-            let pushed = sorter.push(point);
+            let pushed = sorter.push(LasRecord(point));
             is_sorting = pushed.is_err();
             pushed
         });
@@ -97,7 +101,7 @@ impl LasScans {
                 .push("all points have the same GPS time: the file is one cloud without a stamp".into());
         }
         let mut sorted = sorter.finish()?;
-        self.peeked = sorted.next()?;
+        self.peeked = sorted.next()?.map(|record| record.0);
         self.sorted = Some(sorted);
         Ok(())
     }
@@ -126,7 +130,7 @@ impl LasScans {
             return Ok(None);
         }
         self.peeked = match &mut self.sorted {
-            Some(sorted) => sorted.next()?,
+            Some(sorted) => sorted.next()?.map(|record| record.0),
             None => None,
         };
         Ok(Some(point))
@@ -141,7 +145,7 @@ fn window_after(since_s: f64, period_s: f64) -> u64 {
     (since_s / period_s + ROUNDING) as u64
 }
 
-impl CloudSource for LasScans {
+impl<const RECORD_BYTES: usize> CloudSource for LasScans<RECORD_BYTES> {
     fn format(&self) -> &str {
         &self.format
     }
@@ -162,6 +166,7 @@ impl CloudSource for LasScans {
             stamp_ns: self.stamp_ns(window),
             fields: super::las::fields(true),
             has_intensities: true,
+            attributes: self.attributes,
             has_times: !self.has_one_time,
             ..CloudHead::default()
         };
@@ -173,12 +178,8 @@ impl CloudSource for LasScans {
         let Some(window) = self.window else { return Ok(()) };
         let middle_s = if self.has_one_time { self.first_s } else { self.middle_s(window) };
         while let Some(point) = self.next_of(window)? {
-            let intensity = f32::from(point.intensity);
-            visit(CloudPoint {
-                intensity,
-                time_s: point.time_s - middle_s,
-                ..CloudPoint::hit(point.position_m)
-            })?;
+            let time_s = point.time_s - middle_s;
+            visit(CloudPoint { time_s, ..point.cloud_point(self.attributes) })?;
         }
         Ok(())
     }

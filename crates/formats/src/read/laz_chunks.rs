@@ -28,6 +28,7 @@ const TABLE_COPIES: u64 = 2;
 const TABLE_PLACE_BYTES: u64 = 8;
 
 /// Compressed points of a file.
+#[derive(Clone)]
 pub(super) struct Chunks {
     pub(super) items: Vec<LazItem>,
     /// Whether fields are in separate layers instead of point by point.
@@ -39,6 +40,7 @@ pub(super) struct Chunks {
 }
 
 /// Number of points per chunk.
+#[derive(Clone)]
 pub(super) enum ChunkPoints {
     /// A single chunk has all points.
     All,

@@ -3,6 +3,7 @@
 //! Each format is a [`CloudSource`]: files with one cloud (PLY, text, `.bin`), files with several (LAS split by GPS
 //! time, E57), and folders of either.
 
+pub(crate) mod attribute_columns;
 pub(crate) mod bin;
 mod bin_columns;
 pub(crate) mod cloud;
@@ -32,6 +33,8 @@ mod intrinsics;
 #[cfg(feature = "las")]
 pub(crate) mod las;
 #[cfg(feature = "las")]
+mod las_colours;
+#[cfg(feature = "las")]
 mod las_count;
 #[cfg(feature = "las")]
 mod las_hints;
@@ -57,6 +60,7 @@ pub(crate) mod lines;
 pub(crate) mod listing;
 mod lzf;
 pub(crate) mod name_stamps;
+pub(crate) mod of_classes;
 pub(crate) mod one;
 mod pcd;
 pub(crate) mod pcd_header;
@@ -66,7 +70,7 @@ pub(crate) mod ply_header;
 mod ply_rows;
 mod points;
 pub(crate) mod regular;
-mod scalar;
+pub(crate) mod scalar;
 pub(crate) mod scan_graph;
 pub(crate) mod scan_log;
 pub(crate) mod scan_stream;

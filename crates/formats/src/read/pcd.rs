@@ -1,17 +1,19 @@
+use super::attribute_columns::{AttributeColumns, AttributeValues, ColourColumns};
 use super::columns::Meaning;
 use super::input_file::open_input;
 use super::lines::{Extent, RawLines};
 use super::lzf;
 use super::one::{Points, Visit};
-use super::pcd_header::{Encoding, Header, MAX_HEADER_BYTES};
+use super::pcd_header::{Encoding, Field, Header, MAX_HEADER_BYTES};
 use super::regular::check_regular;
+use super::scalar::Scalar;
 use super::skipped_rows::SkippedRows;
 use super::text_line;
 use crate::scans::SensorScan;
 use crate::{Budget, CloudHead, CloudPoint, RigidPose};
 use std::io::{self, BufRead, BufReader, Cursor, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
-use voxtile::scan::Pose;
+use voxtile::scan::{AttributeSet, PointAttributes, Pose};
 use voxtile::{Error, FormatError, Result};
 use voxtile_scratch::ScratchFile;
 
@@ -30,7 +32,8 @@ const MAX_FIELD_BYTES: usize = 1 << 20;
 /// The header is invalid (the error gives the line), or points are missing or not numbers.
 pub fn read_pcd(file: &[u8]) -> Result<SensorScan> {
     let (path, head) = (Path::new("PCD"), CloudHead::default());
-    let (head, mut pcd) = begin(path, head, Cursor::new(file), file.len() as u64, &Budget::default(), true)?;
+    let options = PcdOptions { is_pose_needed: true, ..PcdOptions::default() };
+    let (head, mut pcd) = begin(path, head, Cursor::new(file), file.len() as u64, &options)?;
     let (mut points_in_sensor, mut intensities) = (Vec::new(), head.has_intensities.then(Vec::new));
     pcd.visit(&mut |point| {
         points_in_sensor.push(point.position_m);
@@ -39,15 +42,25 @@ pub fn read_pcd(file: &[u8]) -> Result<SensorScan> {
     })?;
     let RigidPose { position_m, quaternion } = head.world_from_sensor.unwrap_or(RigidPose::IDENTITY);
     let world_from_sensor = Pose::from_quaternion(position_m, quaternion)?;
-    Ok(SensorScan { name: head.name, points_in_sensor, intensities, world_from_sensor })
+    let attributes = PointAttributes::default();
+    Ok(SensorScan { name: head.name, points_in_sensor, intensities, attributes, world_from_sensor })
 }
 
-/// Opens a PCD file and reads its header. An invalid `VIEWPOINT` is an error only if it is needed.
+/// How a PCD file is read.
+#[derive(Clone, Debug, Default)]
+pub(super) struct PcdOptions {
+    /// Memory budget for decompressed data.
+    pub(super) budget: Budget,
+    pub(super) attributes: AttributeSet,
+    /// Whether an invalid `VIEWPOINT` is an error.
+    pub(super) is_pose_needed: bool,
+}
+
+/// Opens a PCD file and reads its header.
 pub(super) fn open(
     path: &Path,
     head: CloudHead,
-    budget: &Budget,
-    is_pose_needed: bool,
+    options: &PcdOptions,
 ) -> Result<(CloudHead, Box<dyn Points>)> {
     check_regular(path)?;
     let file = open_input(path)?;
@@ -56,7 +69,7 @@ pub(super) fn open(
         return Err(Error::argument(path.display().to_string(), "the file is empty"));
     }
     let input = BufReader::with_capacity(1 << 16, file);
-    let (head, points) = begin(path, head, input, bytes, budget, is_pose_needed)?;
+    let (head, points) = begin(path, head, input, bytes, options)?;
     Ok((head, Box::new(points)))
 }
 
@@ -65,6 +78,8 @@ struct PcdPoints<R> {
     path: PathBuf,
     header: Header,
     columns: Columns,
+    /// Converts values to attributes.
+    attributes: AttributeValues,
     input: R,
     file_bytes: u64,
     /// Memory budget for decompressed data.
@@ -78,23 +93,25 @@ fn begin<R: BufRead + Seek>(
     mut head: CloudHead,
     mut input: R,
     file_bytes: u64,
-    budget: &Budget,
-    is_pose_needed: bool,
+    options: &PcdOptions,
 ) -> Result<(CloudHead, PcdPoints<R>)> {
     let cannot = |error| Error::io(path, "read", error);
     let mut start = Vec::new();
     (&mut input).take(MAX_HEADER_BYTES as u64).read_to_end(&mut start).map_err(cannot)?;
-    let parsed = Header::parse(&start).and_then(|header| Ok((Columns::of(&header)?, header)));
+    let parsed =
+        Header::parse(&start).and_then(|header| Ok((Columns::of(&header, options.attributes)?, header)));
     let (columns, mut header) = parsed.map_err(|error| error.in_input(path))?;
     input.seek(SeekFrom::Start(header.data_at as u64)).map_err(cannot)?;
     head.points = Some(header.points as u64);
     head.has_intensities = columns.meaning.intensity.is_some();
+    head.attributes = columns.attributes.set();
     head.world_from_sensor = match std::mem::replace(&mut header.world_from_sensor, Ok(None)) {
-        Err(error) if is_pose_needed => return Err(error.in_input(path)),
+        Err(error) if options.is_pose_needed => return Err(error.in_input(path)),
         pose => pose.unwrap_or_default(),
     };
-    let (path, budget, skipped_rows) = (path.to_owned(), budget.clone(), SkippedRows::default());
-    Ok((head, PcdPoints { path, header, columns, input, file_bytes, budget, skipped_rows }))
+    let attributes = columns.attributes.values(|at| header.fields.get(at).and_then(scalar_of));
+    let (path, budget, skipped_rows) = (path.to_owned(), options.budget.clone(), SkippedRows::default());
+    Ok((head, PcdPoints { path, header, columns, attributes, input, file_bytes, budget, skipped_rows }))
 }
 
 impl<R: BufRead + Seek + Send> Points for PcdPoints<R> {
@@ -103,7 +120,8 @@ impl<R: BufRead + Seek + Send> Points for PcdPoints<R> {
     }
 
     fn remarks(&self) -> Vec<String> {
-        self.columns.meaning.remark().into_iter().chain(self.skipped_rows.remark()).collect()
+        let columns = self.columns.meaning.remark().into_iter();
+        columns.chain(self.skipped_rows.remark()).chain(self.attributes.remarks()).collect()
     }
 }
 
@@ -117,7 +135,7 @@ impl<R: BufRead> PcdPoints<R> {
     }
 
     fn visit_ascii(&mut self, visit: Visit<'_>) -> Result<()> {
-        let Self { path, header, columns, input, skipped_rows, .. } = self;
+        let Self { path, header, columns, attributes, input, skipped_rows, .. } = self;
         let wrong = |line: u64, reason: String| FormatError::at_line(line, reason).in_input(path);
         let mut lines = RawLines::new(input, MAX_LINE_BYTES);
         let (mut number, mut visited) = (header.data_line, 0_u64);
@@ -159,8 +177,15 @@ impl<R: BufRead> PcdPoints<R> {
                 parsed.or_else(other)
             };
             match columns.point(value) {
-                Ok(point) => {
+                Ok(mut point) => {
                     visited += 1;
+                    // An attribute that is not a number is unknown.
+                    let known = |column: usize| value(column).unwrap_or(f64::NAN);
+                    let word = |column: usize| {
+                        let field = header.fields.get(column)?;
+                        packed_bits(words.get(field.first_value)?, field.kind)
+                    };
+                    columns.attributes.set_in(&mut point, attributes, known, word);
                     visit(point)?;
                 }
                 Err(reason) => skipped_rows.add(number, reason),
@@ -174,7 +199,7 @@ impl<R: BufRead> PcdPoints<R> {
 
     /// Reads points stored point by point.
     fn visit_binary(&mut self, visit: Visit<'_>) -> Result<()> {
-        let Self { path, header, columns, input, file_bytes, .. } = self;
+        let Self { path, header, columns, attributes, input, file_bytes, .. } = self;
         let there = file_bytes.saturating_sub(header.data_at as u64);
         let wanted = (header.point_bytes as u64).checked_mul(header.points as u64);
         if wanted.is_none_or(|wanted| wanted > there) {
@@ -188,13 +213,16 @@ impl<R: BufRead> PcdPoints<R> {
             bytes.resize(at_a_time.min(header.points - first) * header.point_bytes, 0);
             input.read_exact(&mut bytes).map_err(|error| Error::io(path, "read", error))?;
             for record in bytes.chunks_exact(header.point_bytes) {
-                let value = |column: usize| {
+                let read = |column: usize, kind: u8| {
                     let field = &header.fields[column];
-                    number(field.kind, &record[field.offset..field.offset + field.size])
+                    number(kind, &record[field.offset..field.offset + field.size])
                 };
-                visit(
-                    columns.point_of(columns.meaning.xyz.map(value), columns.meaning.intensity.map(value)),
-                )?;
+                let value = |column: usize| read(column, header.fields[column].kind);
+                let bits = |column: usize| Some(read(column, b'U') as u32);
+                let mut point =
+                    columns.point_of(columns.meaning.xyz.map(value), columns.meaning.intensity.map(value));
+                columns.attributes.set_in(&mut point, attributes, value, bits);
+                visit(point)?;
             }
         }
         Ok(())
@@ -202,7 +230,7 @@ impl<R: BufRead> PcdPoints<R> {
 
     /// Reads compressed points: the compressed size, the uncompressed size, then the fields one after another.
     fn visit_compressed(&mut self, visit: Visit<'_>) -> Result<()> {
-        let Self { path, header, columns, input, file_bytes, budget, .. } = self;
+        let Self { path, header, columns, attributes, input, file_bytes, budget, .. } = self;
         let cannot = |error| Error::io(path, "read", error);
         let wrong = |reason: String| FormatError::at_offset(header.data_at as u64, reason).in_input(path);
         let there = file_bytes.saturating_sub(header.data_at as u64);
@@ -240,18 +268,26 @@ impl<R: BufRead> PcdPoints<R> {
         if !is_whole.map_err(cannot)? {
             return Err(wrong("the compressed data is damaged".into()));
         }
-        let wanted: Vec<usize> = columns.all().collect();
+        let wanted: Vec<usize> = columns.all().chain(columns.attributes.all()).collect();
         let strides = wanted.iter().map(|&column| header.fields[column].size * header.fields[column].count);
         let at_a_time = (MAX_FIELD_BYTES / strides.max().unwrap_or(1)).clamp(1, BYTES_AT_A_TIME / 8);
         let mut values = vec![Vec::new(); wanted.len()];
         for first in (0..header.points).step_by(at_a_time) {
             let count = at_a_time.min(header.points - first);
             for (values, &column) in values.iter_mut().zip(&wanted) {
-                fields.read(header, column, first, count, values).map_err(cannot)?;
+                let kind = columns.kind(header, column);
+                fields.read(header, column, kind, first, count, values).map_err(cannot)?;
             }
             for k in 0..count {
-                let intensity = values.get(3).map(|values| values[k]);
-                visit(columns.point_of(std::array::from_fn(|axis| values[axis][k]), intensity))?;
+                let value = |column: usize| {
+                    let values = wanted.iter().position(|at| *at == column).and_then(|at| values.get(at));
+                    values.and_then(|values| values.get(k)).copied().unwrap_or(f64::NAN)
+                };
+                let intensity = columns.meaning.intensity.map(|_| values[3][k]);
+                let mut point = columns.point_of(std::array::from_fn(|axis| values[axis][k]), intensity);
+                let bits = |column: usize| Some(value(column) as u32);
+                columns.attributes.set_in(&mut point, attributes, value, bits);
+                visit(point)?;
             }
         }
         Ok(())
@@ -261,17 +297,26 @@ impl<R: BufRead> PcdPoints<R> {
 /// Fields to read.
 struct Columns {
     meaning: Meaning,
+    attributes: AttributeColumns,
 }
 
 const INTENSITY_NAMES: [&str; 4] = ["intensity", "Intensity", "i", "reflectivity"];
 
 impl Columns {
-    fn of(header: &Header) -> std::result::Result<Self, FormatError> {
+    fn of(header: &Header, wanted: AttributeSet) -> std::result::Result<Self, FormatError> {
+        let meaning = Self::meaning_of(header)?;
+        // Fields without values are not there.
+        let names = header.fields.iter().map(|field| if field.count > 0 { field.name.as_str() } else { "" });
+        let is_packed = |at: usize| header.fields.get(at).is_some_and(|field| field.size == 4);
+        Ok(Self { meaning, attributes: AttributeColumns::of(names, wanted, is_packed) })
+    }
+
+    fn meaning_of(header: &Header) -> std::result::Result<Meaning, FormatError> {
         let find = |name: &str| header.fields.iter().position(|field| field.name == name && field.count > 0);
         if let (Some(x), Some(y), Some(z)) = (find("x"), find("y"), find("z")) {
             let mut meaning = Meaning::of_metres([x, y, z]);
             meaning.intensity = INTENSITY_NAMES.iter().find_map(|name| find(name));
-            return Ok(Self { meaning });
+            return Ok(meaning);
         }
         // Find the fields as columns of text tables are found: in upper or lower case, with units.
         let names: Vec<String> = header.fields.iter().map(|field| field.name.clone()).collect();
@@ -286,10 +331,18 @@ impl Columns {
             return Err(FormatError::at_line(header.data_line, reason));
         };
         meaning.intensity = meaning.intensity.filter(|at| header.fields[*at].count > 0);
-        Ok(Self { meaning })
+        Ok(meaning)
     }
 
-    /// Returns the fields to read: x, y, z, and the intensity if there is one.
+    /// Returns the type to read a field as. A packed colour is read as bits, because as a float it may be NaN.
+    fn kind(&self, header: &Header, column: usize) -> u8 {
+        match self.attributes.colour {
+            Some(ColourColumns::Packed(at)) if at == column => b'U',
+            _ => header.fields[column].kind,
+        }
+    }
+
+    /// Returns the fields to read except attributes: x, y, z, and the intensity if there is one.
     fn all(&self) -> impl Iterator<Item = usize> {
         self.meaning.xyz.into_iter().chain(self.meaning.intensity)
     }
@@ -331,6 +384,7 @@ impl Fields {
         &mut self,
         header: &Header,
         column: usize,
+        kind: u8,
         first: usize,
         count: usize,
         values: &mut Vec<f64>,
@@ -344,9 +398,28 @@ impl Fields {
             Self::InFile(file) => file.bytes(at as u64, bytes)?,
         };
         values.clear();
-        values.extend(bytes.chunks_exact(stride).map(|point| number(field.kind, &point[..field.size])));
+        values.extend(bytes.chunks_exact(stride).map(|point| number(kind, &point[..field.size])));
         Ok(())
     }
+}
+
+/// Returns the type of a field.
+fn scalar_of(field: &Field) -> Option<Scalar> {
+    let letter = (field.kind as char).to_ascii_lowercase();
+    Scalar::named(&format!("{letter}{}", 8 * field.size))
+}
+
+/// Parses a packed colour in a text. Programs write the bits as an integer, or as the float with these bits. Floats of
+/// colours have an exponent or are NaN.
+fn packed_bits(word: &str, kind: u8) -> Option<u32> {
+    if kind != b'F' || word.bytes().all(|byte| byte.is_ascii_digit()) {
+        return match word.parse::<i64>() {
+            Ok(bits) => Some(bits as u32),
+            Err(_) => word.parse::<f64>().ok().filter(|bits| *bits >= 0.0).map(|bits| bits as u32),
+        };
+    }
+    // NaN has lost its bits.
+    word.parse::<f32>().ok().filter(|value| !value.is_nan()).map(f32::to_bits)
 }
 
 /// Decodes a little-endian number.

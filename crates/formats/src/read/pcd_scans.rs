@@ -4,8 +4,9 @@ use super::file_order::sort_naturally;
 use super::files::Files;
 use super::from_origin::FromOrigin;
 use super::name_stamps::NameStamps;
+use super::of_classes::OfClasses;
 use super::one::OneCloud;
-use super::pcd;
+use super::pcd::{self, PcdOptions};
 use crate::poses::{CloudPoses, PosedClouds};
 use crate::poses::{PoseSource, SAME_TIME_NS};
 use crate::poses::{Rules, Trajectory};
@@ -55,10 +56,15 @@ pub(crate) fn open_files(
     };
     let is_viewpoint_needed = matches!(poses, CloudPoses::Source(_));
     let must_have_viewpoint = matches!(poses, CloudPoses::Source(PoseSource::Viewpoint));
-    let (is_alone, budget) = (files.len() == 1, options.budget());
+    let is_alone = files.len() == 1;
+    let pcd_options = PcdOptions {
+        budget: options.budget(),
+        attributes: options.attributes_to_read(),
+        is_pose_needed: is_viewpoint_needed,
+    };
     let has_origin = options.sensor_origin_m.is_some();
     let open = move |path: &Path| -> Result<Box<dyn CloudSource>> {
-        let (mut head, points) = pcd::open(path, stamps.head_of(path), &budget, is_viewpoint_needed)?;
+        let (mut head, points) = pcd::open(path, stamps.head_of(path), &pcd_options)?;
         if head.world_from_sensor.is_none() && must_have_viewpoint {
             let reason = "this file has no VIEWPOINT, but other files of the folder do: its pose is unknown";
             return Err(FormatError::at_line(1, reason).in_input(path));
@@ -81,6 +87,7 @@ pub(crate) fn open_files(
         Some(origin_m) => Box::new(FromOrigin::new(clouds, origin_m)?),
         None => clouds,
     };
+    let clouds = OfClasses::of(clouds, options);
     if let (CloudPoses::File(trajectory), false) = (&mut poses, has_stamps) {
         trajectory.check_order()?;
         warn_of_shift(trajectory, &files, stamps)?;
@@ -187,7 +194,8 @@ fn number_in(path: &Path) -> Option<f64> {
 
 /// Returns whether the `VIEWPOINT` of a PCD file gives a sensor pose.
 fn is_placed(path: &Path) -> bool {
-    let head = pcd::open(path, CloudHead::default(), &Default::default(), true).ok();
+    let options = PcdOptions { is_pose_needed: true, ..PcdOptions::default() };
+    let head = pcd::open(path, CloudHead::default(), &options).ok();
     head.and_then(|(head, _)| head.world_from_sensor).is_some_and(|pose| !is_identity(&pose))
 }
 

@@ -1,3 +1,4 @@
+use super::attribute_columns::{AttributeColumns, AttributeValues};
 use super::cloud::CloudHead;
 use super::columns::{Clock, Meaning};
 use super::input_file::open_input;
@@ -20,6 +21,9 @@ struct PlyPoints {
     input: Option<BufReader<File>>,
     vertices: usize,
     meaning: Meaning,
+    attributes: AttributeColumns,
+    /// Converts values to attributes.
+    values: AttributeValues,
     clock: Clock,
     skipped_rows: SkippedRows,
 }
@@ -28,7 +32,7 @@ struct PlyPoints {
 pub(crate) fn open(
     path: &Path,
     mut head: CloudHead,
-    _: &ReadOptions,
+    options: &ReadOptions,
 ) -> Result<(CloudHead, Box<dyn Points>)> {
     let mut input = BufReader::with_capacity(1 << 16, open_input(path)?);
     let header = Header::read(path, &mut input)?;
@@ -41,13 +45,20 @@ pub(crate) fn open(
     let is_integer = |at: usize| element.properties.get(at).is_some_and(|found| found.kind.is_integer());
     let meaning = Meaning::of(&names, is_integer).map_err(|reason| wrong(&reason))?;
     let meaning = meaning.ok_or_else(|| wrong("vertices lack x, y or z"))?;
+    let property = |at: usize| element.properties.get(at).filter(|property| property.list.is_none());
+    let wanted = options.attributes_to_read();
+    let attributes = AttributeColumns::of(names.iter().map(String::as_str), wanted, |_| false);
+    let values = attributes.values(|at| property(at).map(|property| property.kind));
     head.points = Some(element.count);
+    head.attributes = attributes.set();
     head.fields = names;
     head.has_intensities = meaning.intensity.is_some();
     head.has_times = meaning.time.is_some();
     let (clock, skipped_rows) = (Clock::new(head.stamp_ns), SkippedRows::default());
     let (path, input) = (path.to_owned(), Some(input));
-    Ok((head, Box::new(PlyPoints { path, header, input, vertices, meaning, clock, skipped_rows })))
+    let points =
+        PlyPoints { path, header, input, vertices, meaning, attributes, values, clock, skipped_rows };
+    Ok((head, Box::new(points)))
 }
 
 impl Points for PlyPoints {
@@ -64,13 +75,14 @@ impl Points for PlyPoints {
         let comment = self.header.unit.as_ref().filter(|_| units.is_none()).map(|(line, comment)| {
             format!("line {line} contains `{comment:.60}`, but coordinates are read as metres")
         });
-        units.into_iter().chain(comment).chain(self.skipped_rows.remark()).collect()
+        let rows = self.skipped_rows.remark();
+        units.into_iter().chain(comment).chain(rows).chain(self.values.remarks()).collect()
     }
 }
 
 impl PlyPoints {
     fn read_ascii(&mut self, lines: Lines, visit: Visit<'_>) -> Result<()> {
-        let (meaning, mut visited) = (self.meaning, 0_u64);
+        let (meaning, attributes, mut visited) = (self.meaning, self.attributes, 0_u64);
         let mut rows = PlyRows::new(lines);
         for (number, element) in self.header.elements.iter().enumerate() {
             if element.properties.is_empty() {
@@ -85,11 +97,13 @@ impl PlyPoints {
                 continue;
             }
             for done in 0..element.count {
-                match rows.next(element, done, &|at| meaning.reads(at))? {
+                match rows.next(element, done, &|at| meaning.reads(at) || attributes.reads(at))? {
                     Row::Values(values) => {
                         visited += 1;
                         let value = |at: usize| values.get(at).copied().unwrap_or(f64::NAN);
-                        visit(self.clock.point(&meaning, value))?;
+                        let mut point = self.clock.point(&meaning, value);
+                        attributes.set_in(&mut point, &mut self.values, value, |_| None);
+                        visit(point)?;
                     }
                     Row::Unread(line, reason) => self.skipped_rows.add(line, reason),
                 }
@@ -133,7 +147,10 @@ impl PlyPoints {
                     Err(error) => return Err(Error::io(&self.path, "read", error)),
                 }
                 if is_wanted {
-                    visit(self.clock.point(&self.meaning, |at| values.get(at).copied().unwrap_or(f64::NAN)))?;
+                    let value = |at: usize| values.get(at).copied().unwrap_or(f64::NAN);
+                    let mut point = self.clock.point(&self.meaning, value);
+                    self.attributes.set_in(&mut point, &mut self.values, value, |_| None);
+                    visit(point)?;
                 }
             }
         }

@@ -1,6 +1,6 @@
 /// Type of a number in a binary file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Scalar {
+pub(crate) enum Scalar {
     I8,
     U8,
     I16,
@@ -27,7 +27,7 @@ macro_rules! number {
 impl Scalar {
     /// Returns the type with this name: as in PLY (`uchar`, `float`), as in NumPy (`uint8`, `float32`), or short (`u8`,
     /// `f32`).
-    pub(super) fn named(name: &str) -> Option<Self> {
+    pub(crate) fn named(name: &str) -> Option<Self> {
         Some(match name.to_ascii_lowercase().as_str() {
             "char" | "int8" | "i8" => Self::I8,
             "uchar" | "uint8" | "u8" => Self::U8,
@@ -43,7 +43,7 @@ impl Scalar {
         })
     }
 
-    pub(super) fn bytes(self) -> usize {
+    pub(crate) fn bytes(self) -> usize {
         match self {
             Self::I8 | Self::U8 => 1,
             Self::I16 | Self::U16 => 2,
@@ -52,12 +52,12 @@ impl Scalar {
         }
     }
 
-    pub(super) fn is_integer(self) -> bool {
+    pub(crate) fn is_integer(self) -> bool {
         !matches!(self, Self::F32 | Self::F64)
     }
 
     /// Decodes the value at the start of `bytes`. Missing bytes count as zero, so callers must check the length.
-    pub(super) fn value(self, bytes: &[u8], is_big_endian: bool) -> f64 {
+    pub(crate) fn value(self, bytes: &[u8], is_big_endian: bool) -> f64 {
         match self {
             Self::I8 => f64::from(number!(i8, bytes, is_big_endian)),
             Self::U8 => f64::from(number!(u8, bytes, is_big_endian)),

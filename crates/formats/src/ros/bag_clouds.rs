@@ -12,6 +12,7 @@ use crate::read::cloud::{CloudHead, CloudPoint, CloudSource, PoseAt};
 use crate::spill::{Bytes, FilePart};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
+use voxtile::scan::AttributeSet;
 use voxtile::{Error, FormatError, Result};
 
 /// Source of the clouds of one topic of a recording, with the poses from the recording.
@@ -209,6 +210,7 @@ impl CloudSource for BagClouds {
             fields,
             has_intensities,
             has_times,
+            attributes: AttributeSet::NONE,
         };
         self.current = Some(message);
         self.frame.clone_from(&head.frame);

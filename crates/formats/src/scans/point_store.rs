@@ -1,7 +1,7 @@
 use std::io;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
-use voxtile::scan::{MovingMarks, TakePoints};
+use voxtile::scan::{AttributeSet, MovingMarks, PointAttributes, TakeAttributed, TakePoints};
 use voxtile::space::Point;
 use voxtile::{Error, Result};
 use voxtile_scratch::{ScratchFile, Window};
@@ -9,15 +9,20 @@ use voxtile_scratch::{ScratchFile, Window};
 /// Points of one scan in the sensor frame, in metres: in memory up to a limit, the others in a temporary file.
 ///
 /// The file has no name and is freed when the store is dropped.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub struct PointStore {
     /// The last points, or all of them if there is no file.
     points: Vec<Point>,
     intensities: Option<Vec<f32>>,
+    /// Attributes of the points in memory. Lists that the scan does not have are empty.
+    attributes: PointAttributes,
+    attribute_set: AttributeSet,
     /// Number of points in the file, which precede those in memory.
     filed: usize,
     file: Option<ScratchFile>,
     budget: PointBudget,
+    /// Maximum number of points in memory, from the budget.
+    max_points: usize,
     /// Marks of moving points, if the source has any.
     moving: Option<Box<MovingMarks>>,
 }
@@ -25,29 +30,45 @@ pub struct PointStore {
 /// Memory limit for the points of a scan, and the folder for the others.
 #[derive(Clone, Debug)]
 pub struct PointBudget {
-    max_points: usize,
+    max_bytes: usize,
     folder: PathBuf,
 }
 
-/// Size of a point in the file: the point and its intensity (0 if there is none), in native byte order, because no
-/// other process reads the file.
+/// Size of a point in the file without attributes: the point and its intensity (0 if there is none), in native byte
+/// order, because no other process reads the file.
 const RECORD_BYTES: usize = size_of::<Point>() + size_of::<f32>();
+/// Size of a colour in the file: whether there is one, red, green and blue. It follows the intensity.
+const COLOUR_BYTES: usize = 4;
+/// Size of a class in the file: whether there is one, and the class. It is last.
+const CLASS_BYTES: usize = 2;
 /// Number of points to read at once.
 const POINTS_AT_A_TIME: usize = 1 << 14;
 /// Number of points in memory to pass at once. The receiver copies them into the world frame (6 MiB), and beam
 /// coherence works within one chunk, which should be a whole scan for most sensors.
 const POINTS_PER_CHUNK: usize = 1 << 18;
 
+impl Default for PointStore {
+    /// All points stay in memory.
+    fn default() -> Self {
+        Self::empty()
+    }
+}
+
 impl Default for PointBudget {
     fn default() -> Self {
-        Self { max_points: usize::MAX, folder: PathBuf::new() }
+        Self { max_bytes: usize::MAX, folder: PathBuf::new() }
     }
 }
 
 impl PointBudget {
     /// Creates a limit in bytes. Further points go to a file in `folder`.
     pub fn new(max_bytes: usize, folder: &Path) -> Self {
-        Self { max_points: (max_bytes / RECORD_BYTES).max(POINTS_AT_A_TIME), folder: folder.to_owned() }
+        Self { max_bytes, folder: folder.to_owned() }
+    }
+
+    /// Returns the number of points in memory at most.
+    fn max_points(&self, record_bytes: usize) -> usize {
+        (self.max_bytes / record_bytes).max(POINTS_AT_A_TIME)
     }
 
     /// Creates an unnamed temporary file.
@@ -65,13 +86,28 @@ impl PointBudget {
 impl PointStore {
     /// Creates an empty store.
     pub fn new(budget: PointBudget) -> Self {
-        Self { budget, ..Self::default() }
+        Self { max_points: budget.max_points(RECORD_BYTES), budget, ..Self::empty() }
     }
 
-    /// Removes all points and sets whether the next ones have intensities.
+    fn empty() -> Self {
+        let (points, intensities, attributes, attribute_set) = Default::default();
+        let (filed, file, moving, budget) = Default::default();
+        let max_points = usize::MAX;
+        Self { points, intensities, attributes, attribute_set, filed, file, budget, max_points, moving }
+    }
+
+    /// Removes all points and sets whether the next ones have intensities. They have no attributes.
     pub fn begin(&mut self, has_intensities: bool) {
+        self.begin_with(has_intensities, AttributeSet::NONE);
+    }
+
+    /// Removes all points and sets whether the next ones have intensities, and which attributes they have.
+    pub fn begin_with(&mut self, has_intensities: bool, attributes: AttributeSet) {
         self.points.clear();
         self.intensities = has_intensities.then(Vec::new);
+        self.attributes.clear();
+        self.attribute_set = attributes;
+        self.max_points = self.budget.max_points(self.record_bytes());
         (self.filed, self.file, self.moving) = (0, None, None);
     }
 
@@ -91,31 +127,53 @@ impl PointStore {
 
     /// Reserves memory for points, up to the limit.
     pub(crate) fn reserve(&mut self, points: usize) {
-        let points = points.min(self.budget.max_points);
+        let points = points.min(self.max_points);
         self.points.reserve_exact(points);
         if let Some(intensities) = &mut self.intensities {
             intensities.reserve_exact(points);
         }
     }
 
-    /// Adds a point. The intensity is ignored if the scan has none.
+    /// Adds a point without attributes. The intensity is ignored if the scan has none.
     ///
     /// # Errors
     ///
     /// A file cannot be written.
     #[inline]
     pub fn push(&mut self, point: Point, intensity: f32) -> Result<()> {
-        if self.points.len() == self.budget.max_points {
+        self.push_with(point, intensity, None, None)
+    }
+
+    /// Adds a point with its attributes. Values that the scan does not have are ignored.
+    ///
+    /// # Errors
+    ///
+    /// A file cannot be written.
+    #[inline]
+    pub fn push_with(
+        &mut self,
+        point: Point,
+        intensity: f32,
+        colour: Option<[u8; 3]>,
+        class: Option<u8>,
+    ) -> Result<()> {
+        if self.points.len() == self.max_points {
             self.put_in_file()?;
         }
         self.points.push(point);
         if let Some(intensities) = &mut self.intensities {
             intensities.push(intensity);
         }
+        if self.attribute_set.colours {
+            self.attributes.colours.push(colour);
+        }
+        if self.attribute_set.classes {
+            self.attributes.classes.push(class);
+        }
         Ok(())
     }
 
-    /// Adds points with their intensities, which are ignored if the scan has none.
+    /// Adds points without attributes, with their intensities, which are ignored if the scan has none.
     ///
     /// # Errors
     ///
@@ -124,7 +182,8 @@ impl PointStore {
         &mut self,
         mut points: impl ExactSizeIterator<Item = (Point, f32)> + Clone,
     ) -> Result<()> {
-        if points.len() > self.budget.max_points.saturating_sub(self.points.len()) {
+        let is_beyond = points.len() > self.max_points.saturating_sub(self.points.len());
+        if is_beyond || !self.attribute_set.is_none() {
             return points.try_for_each(|(point, intensity)| self.push(point, intensity));
         }
         self.points.extend(points.clone().map(|(point, _)| point));
@@ -143,13 +202,20 @@ impl PointStore {
         let cannot = |error| {
             Error::io(self.budget.folder(), "store the points of a scan in a temporary file in", error)
         };
-        let mut bytes = Vec::with_capacity(POINTS_AT_A_TIME * RECORD_BYTES);
+        let mut bytes = Vec::with_capacity(POINTS_AT_A_TIME * self.record_bytes());
         for (chunk, points) in self.points.chunks(POINTS_AT_A_TIME).enumerate() {
             bytes.clear();
             for (number, point) in (chunk * POINTS_AT_A_TIME..).zip(points) {
                 let intensity = self.intensities.as_ref().map_or(0.0, |intensities| intensities[number]);
                 bytes.extend_from_slice(bytemuck::bytes_of(point));
                 bytes.extend_from_slice(bytemuck::bytes_of(&intensity));
+                if let Some(colour) = self.attributes.colours.get(number) {
+                    let [red, green, blue] = colour.unwrap_or_default();
+                    bytes.extend([u8::from(colour.is_some()), red, green, blue]);
+                }
+                if let Some(class) = self.attributes.classes.get(number) {
+                    bytes.extend([u8::from(class.is_some()), class.unwrap_or_default()]);
+                }
             }
             file.append(&bytes).map_err(cannot)?;
         }
@@ -158,8 +224,15 @@ impl PointStore {
         if let Some(intensities) = &mut self.intensities {
             intensities.clear();
         }
+        self.attributes.clear();
         self.file = Some(file);
         Ok(())
+    }
+
+    /// Returns the size of a point in the file.
+    fn record_bytes(&self) -> usize {
+        let AttributeSet { colours, classes } = self.attribute_set;
+        RECORD_BYTES + COLOUR_BYTES * usize::from(colours) + CLASS_BYTES * usize::from(classes)
     }
 
     /// Returns the number of points.
@@ -177,6 +250,11 @@ impl PointStore {
         self.intensities.is_some()
     }
 
+    /// Returns which attributes the points have.
+    pub fn attributes(&self) -> AttributeSet {
+        self.attribute_set
+    }
+
     /// Passes the points of a range to `take` in order, chunk by chunk, with their intensities if there are any. `take`
     /// returns whether to continue.
     ///
@@ -184,21 +262,28 @@ impl PointStore {
     ///
     /// A file cannot be read.
     pub fn for_each_chunk(&self, range: Range<usize>, take: &mut TakePoints<'_>) -> Result<()> {
+        self.for_each_attributed_chunk(range, &mut |points, intensities, _| take(points, intensities))
+    }
+
+    /// As [`PointStore::for_each_chunk`], with the points' attributes.
+    ///
+    /// # Errors
+    ///
+    /// A file cannot be read.
+    pub fn for_each_attributed_chunk(
+        &self,
+        range: Range<usize>,
+        take: &mut TakeAttributed<'_>,
+    ) -> Result<()> {
         let in_file = range.start.min(self.filed)..range.end.min(self.filed);
         let in_memory = range.start.max(self.filed) - self.filed..range.end.max(self.filed) - self.filed;
         let mut next = in_file.start;
-        let (mut points, mut intensities) = (Vec::new(), Vec::new());
+        let mut chunk = FileChunk::default();
         while next < in_file.end {
             let count = (in_file.end - next).min(POINTS_AT_A_TIME);
-            let bytes = self.window(next, count)?;
-            points.clear();
-            intensities.clear();
-            for record in bytes.chunks_exact(RECORD_BYTES) {
-                let (point, intensity) = record.split_at(size_of::<Point>());
-                points.push(bytemuck::pod_read_unaligned::<Point>(point));
-                intensities.push(bytemuck::pod_read_unaligned::<f32>(intensity));
-            }
-            if !take(&points, self.has_intensities().then_some(&*intensities)) {
+            chunk.decode(&self.window(next, count)?, self.record_bytes(), self.attribute_set);
+            let intensities = self.has_intensities().then_some(&*chunk.intensities);
+            if !take(&chunk.points, intensities, chunk.attributes.part(0..count)) {
                 return Ok(());
             }
             next += count;
@@ -206,7 +291,7 @@ impl PointStore {
         for first in in_memory.clone().step_by(POINTS_PER_CHUNK) {
             let some = first..in_memory.end.min(first + POINTS_PER_CHUNK);
             let intensities = self.intensities.as_ref().map(|intensities| &intensities[some.clone()]);
-            if !take(&self.points[some], intensities) {
+            if !take(&self.points[some.clone()], intensities, self.attributes.part(some)) {
                 return Ok(());
             }
         }
@@ -215,8 +300,9 @@ impl PointStore {
 
     /// Maps a range of point records of the file.
     fn window(&self, first: usize, count: usize) -> Result<Window> {
+        let record_bytes = self.record_bytes();
         let window = match &self.file {
-            Some(file) => file.window((first * RECORD_BYTES) as u64, count * RECORD_BYTES),
+            Some(file) => file.window((first * record_bytes) as u64, count * record_bytes),
             None => Err(io::ErrorKind::UnexpectedEof.into()),
         };
         window.map_err(|error| {
@@ -224,15 +310,46 @@ impl PointStore {
         })
     }
 
-    /// Returns points and intensities, if all are in memory.
-    pub(crate) fn into_parts(self) -> (Vec<Point>, Option<Vec<f32>>) {
-        (self.points, self.intensities)
+    /// Returns points, intensities and attributes, if all are in memory.
+    pub(crate) fn into_parts(self) -> (Vec<Point>, Option<Vec<f32>>, PointAttributes) {
+        (self.points, self.intensities, self.attributes)
+    }
+}
+
+/// Points read from the file.
+#[derive(Default)]
+struct FileChunk {
+    points: Vec<Point>,
+    intensities: Vec<f32>,
+    attributes: PointAttributes,
+}
+
+impl FileChunk {
+    /// Replaces the content by the decoded records.
+    fn decode(&mut self, bytes: &[u8], record_bytes: usize, set: AttributeSet) {
+        self.points.clear();
+        self.intensities.clear();
+        self.attributes.clear();
+        for record in bytes.chunks_exact(record_bytes) {
+            let (point, rest) = record.split_at(size_of::<Point>());
+            let (intensity, mut rest) = rest.split_at(size_of::<f32>());
+            self.points.push(bytemuck::pod_read_unaligned::<Point>(point));
+            self.intensities.push(bytemuck::pod_read_unaligned::<f32>(intensity));
+            if let (true, [is_there, red, green, blue, class @ ..]) = (set.colours, rest) {
+                self.attributes.colours.push((*is_there != 0).then_some([*red, *green, *blue]));
+                rest = class;
+            }
+            if let (true, [is_there, class]) = (set.classes, rest) {
+                self.attributes.classes.push((*is_there != 0).then_some(*class));
+            }
+        }
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use voxtile::scan::AttributeSlices;
 
     #[test]
     fn points_from_file_and_memory_are_in_order() {
@@ -250,7 +367,7 @@ mod tests {
                         .map(point)
                         .for_each(|(point, intensity)| store.push(point, intensity).unwrap()),
                 }
-                assert!(store.points.len() <= store.budget.max_points);
+                assert!(store.points.len() <= store.max_points);
             }
             assert_eq!((store.len(), store.file.is_some()), (count, max_bytes < usize::MAX));
             for range in
@@ -274,5 +391,44 @@ mod tests {
             }
         }
         assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
+    }
+
+    #[test]
+    fn attributes_are_equal_from_file_and_memory() {
+        let folder = tempfile::TempDir::new().unwrap();
+        let count = 3 * POINTS_AT_A_TIME + 77;
+        let colour = |k: usize| (!k.is_multiple_of(3)).then_some([k as u8, (k / 7) as u8, (k / 256) as u8]);
+        let class = |k: usize| (!k.is_multiple_of(5)).then_some((k % 251) as u8);
+        for (colours, classes) in [(true, true), (true, false), (false, true), (false, false)] {
+            let set = AttributeSet { colours, classes };
+            for max_bytes in [0, 1 << 20, usize::MAX] {
+                let mut store = PointStore::new(PointBudget::new(max_bytes, folder.path()));
+                store.begin(true);
+                store.push([1.0; 3], 1.0).unwrap();
+                store.begin_with(true, set);
+                for k in 0..count {
+                    store.push_with([k as f64; 3], k as f32, colour(k), class(k)).unwrap();
+                }
+                assert_eq!((store.len(), store.attributes()), (count, set));
+                assert_eq!(store.file.is_some(), max_bytes < usize::MAX);
+                assert!(store.record_bytes() <= RECORD_BYTES + 6);
+                for range in [0..count, POINTS_AT_A_TIME - 1..2 * POINTS_AT_A_TIME + 1, count - 1..count] {
+                    let mut next = range.start;
+                    let mut take = |points: &[Point], _: Option<&[f32]>, attributes: AttributeSlices<'_>| {
+                        for (at, point) in points.iter().enumerate() {
+                            assert_eq!(point[0], next as f64);
+                            assert_eq!(attributes.colour(at), colour(next).filter(|_| colours));
+                            assert_eq!(attributes.class(at), class(next).filter(|_| classes));
+                            next += 1;
+                        }
+                        assert!(attributes.colours.len() == points.len() || !colours);
+                        assert!(attributes.classes.len() == points.len() || !classes);
+                        true
+                    };
+                    store.for_each_attributed_chunk(range.clone(), &mut take).unwrap();
+                    assert_eq!(next, range.end);
+                }
+            }
+        }
     }
 }

@@ -1,8 +1,8 @@
 use super::stored_scan::StoredScan;
 use voxtile::Result;
-use voxtile::scan::Pose;
+use voxtile::scan::{AttributeSet, AttributeSlices, Pose};
 
-/// Fingerprint of a scan: a hash of its points and intensities, and another of its pose. It does not depend on storage
+/// Fingerprint of a scan: a hash of its points, intensities and attributes, and another of its pose. It does not depend on storage
 /// format and file name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ScanFingerprint {
@@ -53,6 +53,13 @@ impl ScanFingerprint {
                         .for_each(|&number| bytes.extend(bits(f64::from(number)).to_le_bytes()));
                     hasher.update(&bytes);
                 }
+                true
+            })?;
+        }
+        if !store.attributes().is_none() {
+            hash_set(&mut hasher, store.attributes());
+            store.for_each_attributed_chunk(0..store.len(), &mut |_, _, attributes| {
+                hash_attributes(&mut hasher, attributes);
                 true
             })?;
         }
@@ -123,6 +130,27 @@ impl ScanChain {
             hasher.update(new);
             *chain = fingerprint(&hasher);
         }
+    }
+}
+
+/// Hashes which attributes points have.
+pub(super) fn hash_set(hasher: &mut blake3::Hasher, set: AttributeSet) {
+    hasher.update(&[u8::from(set.colours), u8::from(set.classes)]);
+}
+
+/// Hashes attributes point by point, so that the result does not depend on the size of chunks.
+pub(super) fn hash_attributes(hasher: &mut blake3::Hasher, attributes: AttributeSlices<'_>) {
+    let points = attributes.colours.len().max(attributes.classes.len());
+    let mut bytes = Vec::new();
+    for first in (0..points).step_by(POINTS_AT_A_TIME) {
+        bytes.clear();
+        for number in first..points.min(first + POINTS_AT_A_TIME) {
+            let (colour, class) = (attributes.colour(number), attributes.class(number));
+            let [red, green, blue] = colour.unwrap_or_default();
+            bytes.extend([u8::from(colour.is_some()), red, green, blue]);
+            bytes.extend([u8::from(class.is_some()), class.unwrap_or_default()]);
+        }
+        hasher.update(&bytes);
     }
 }
 
@@ -220,6 +248,22 @@ mod tests {
         let of = |intensity| fingerprint_of(&scan(&first_points, intensity, 0.0)).scan_text();
         let fingerprints = [None, Some(1.0), Some(2.0)].map(of);
         assert!(fingerprints[0] != fingerprints[1] && fingerprints[1] != fingerprints[2], "{fingerprints:?}");
+
+        let painted = |colour: Option<[u8; 3]>, class: Option<u8>| {
+            let mut scan = scan(&[], None, 0.0);
+            scan.points_in_sensor.begin_with(false, AttributeSet { colours: true, classes: true });
+            scan.points_in_sensor.push_with(first_points[0], 0.0, colour, class).unwrap();
+            fingerprint_of(&scan).scan_text()
+        };
+        let mut painted = [
+            fingerprints[0].clone(),
+            painted(None, None),
+            painted(Some([0; 3]), None),
+            painted(Some([1, 0, 0]), None),
+            painted(None, Some(0)),
+        ];
+        painted.sort();
+        assert!(painted.windows(2).all(|pair| pair[0] != pair[1]), "{painted:?}");
 
         let mut unread = chain_of(&scans()[..1]);
         unread.add_unread();

@@ -1,10 +1,11 @@
+use super::scan_chain::{hash_attributes, hash_set};
 use super::sensor_scan::SensorScan;
 use voxtile::scan::Pose;
 
 /// Content hash and horizontal extent of a scan. A build in shards needs them for every scan in advance.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ScanReach {
-    /// Hash of points, intensities and pose, to the last bit.
+    /// Hash of points, intensities, attributes and pose, to the last bit.
     pub content: [u8; 16],
     /// Minimum and maximum x and y of the sensor and of all ray ends, in metres in the world frame, up to rounding.
     /// `None` if no ray affects the map.
@@ -28,6 +29,10 @@ fn content_of(scan: &SensorScan) -> [u8; 16] {
     let pose = &scan.world_from_sensor;
     for number in pose.position_m().into_iter().chain(pose.quaternion()) {
         hasher.update(&number.to_le_bytes());
+    }
+    if !scan.attributes.set().is_none() {
+        hash_set(&mut hasher, scan.attributes.set());
+        hash_attributes(&mut hasher, scan.attributes.part(0..scan.points_in_sensor.len()));
     }
     let mut content = [0; 16];
     hasher.finalize_xof().fill(&mut content);
@@ -73,12 +78,14 @@ fn bounds_of(
 mod tests {
     use super::*;
     use proptest::prelude::*;
+    use voxtile::scan::PointAttributes;
 
     fn scan(points: Vec<[f64; 3]>, pose: Pose) -> SensorScan {
         SensorScan {
             name: String::new(),
             points_in_sensor: points,
             intensities: None,
+            attributes: PointAttributes::default(),
             world_from_sensor: pose,
         }
     }
@@ -146,6 +153,13 @@ mod tests {
             scan(vec![[1.0, 2.0, 3.0]; 2], pose(0.0)),
         ];
         others.push(SensorScan { intensities: Some(vec![1.0]), ..scan(vec![[1.0, 2.0, 3.0]], pose(0.0)) });
+        for attributes in [
+            PointAttributes { colours: vec![None], ..PointAttributes::default() },
+            PointAttributes { colours: vec![Some([0; 3])], ..PointAttributes::default() },
+            PointAttributes { classes: vec![Some(0)], ..PointAttributes::default() },
+        ] {
+            others.push(SensorScan { attributes, ..scan(vec![[1.0, 2.0, 3.0]], pose(0.0)) });
+        }
         assert_eq!(content(&one), content(&scan(vec![[1.0, 2.0, 3.0]], pose(0.0))));
         assert!(others.iter().all(|other| content(other) != content(&one)));
         // Invalid ranges are reported elsewhere, when the map is created; here they must not panic.

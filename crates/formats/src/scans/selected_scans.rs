@@ -145,7 +145,7 @@ impl SelectedScans {
         let budget: PointBudget = points.budget().clone();
         self.unfiltered = PointStore::new(budget);
         let head = self.source.read_scan(&mut self.unfiltered)?;
-        points.begin(self.unfiltered.has_intensities());
+        points.begin_with(self.unfiltered.has_intensities(), self.unfiltered.attributes());
         let to_body = self.selection.body_from_sensor.as_ref().map(Pose::to_world);
         let is_ignored = |point: [f64; 3]| {
             let point = to_body.as_ref().map_or(point, |to_body| to_body(point));
@@ -153,25 +153,29 @@ impl SelectedScans {
         };
         let mut marks = self.unfiltered.moving().map(|moving| (moving.iter(), MovingMarks::builder()));
         let mut outcome = Ok(());
-        self.unfiltered.for_each_chunk(0..self.unfiltered.len(), &mut |chunk, intensities| {
-            for (number, &point) in chunk.iter().enumerate() {
-                let is_taken = !is_ignored(point);
-                if let Some((all, taken)) = &mut marks
-                    && let Some(is_moving) = all.next()
-                    && is_taken
-                {
-                    taken.push(is_moving);
-                }
-                if is_taken {
-                    let intensity = intensities.map_or(0.0, |intensities| intensities[number]);
-                    outcome = points.push(point, intensity);
-                    if outcome.is_err() {
-                        return false;
+        self.unfiltered.for_each_attributed_chunk(
+            0..self.unfiltered.len(),
+            &mut |chunk, intensities, attributes| {
+                for (number, &point) in chunk.iter().enumerate() {
+                    let is_taken = !is_ignored(point);
+                    if let Some((all, taken)) = &mut marks
+                        && let Some(is_moving) = all.next()
+                        && is_taken
+                    {
+                        taken.push(is_moving);
+                    }
+                    if is_taken {
+                        let intensity = intensities.map_or(0.0, |intensities| intensities[number]);
+                        let (colour, class) = (attributes.colour(number), attributes.class(number));
+                        outcome = points.push_with(point, intensity, colour, class);
+                        if outcome.is_err() {
+                            return false;
+                        }
                     }
                 }
-            }
-            true
-        })?;
+                true
+            },
+        )?;
         points.set_moving(marks.map(|(_, taken)| taken.finish()));
         self.unfiltered = PointStore::default();
         outcome?;

@@ -37,8 +37,8 @@ pub trait ScanSource {
         let mut points = PointStore::default();
         let head = self.read_scan(&mut points)?;
         Ok(head.map(|ScanHead { name, world_from_sensor, .. }| {
-            let (points_in_sensor, intensities) = points.into_parts();
-            SensorScan { name, points_in_sensor, intensities, world_from_sensor }
+            let (points_in_sensor, intensities, attributes) = points.into_parts();
+            SensorScan { name, points_in_sensor, intensities, attributes, world_from_sensor }
         }))
     }
 

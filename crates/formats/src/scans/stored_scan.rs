@@ -1,7 +1,7 @@
 use super::point_store::PointStore;
 use std::ops::Range;
 use voxtile::Result;
-use voxtile::scan::{MovingMarks, Pose, ScanPoints, TakePoints};
+use voxtile::scan::{AttributeSet, MovingMarks, PointFrame, Pose, ScanPoints, TakeAttributed, TakePoints};
 use voxtile::space::Point;
 
 /// Scan of any size in the sensor frame, with the sensor's pose.
@@ -40,12 +40,30 @@ impl ScanPoints for StoredScan {
         self.points_in_sensor.moving()
     }
 
-    fn for_each_chunk(&self, range: Range<usize>, take: &mut TakePoints<'_>) -> Result<()> {
+    fn attributes(&self) -> AttributeSet {
+        self.points_in_sensor.attributes()
+    }
+
+    fn for_each_attributed_chunk(
+        &self,
+        range: Range<usize>,
+        frame: PointFrame,
+        take: &mut TakeAttributed<'_>,
+    ) -> Result<()> {
+        if frame == PointFrame::Own {
+            return self.points_in_sensor.for_each_attributed_chunk(range, take);
+        }
         let (to_world, mut in_world) = (self.world_from_sensor.to_world(), Vec::new());
-        self.points_in_sensor.for_each_chunk(range, &mut |points, intensities| {
+        self.points_in_sensor.for_each_attributed_chunk(range, &mut |points, intensities, attributes| {
             in_world.clear();
             in_world.extend(points.iter().copied().map(to_world));
-            take(&in_world, intensities)
+            take(&in_world, intensities, attributes)
+        })
+    }
+
+    fn for_each_chunk(&self, range: Range<usize>, take: &mut TakePoints<'_>) -> Result<()> {
+        self.for_each_attributed_chunk(range, PointFrame::World, &mut |points, intensities, _| {
+            take(points, intensities)
         })
     }
 

@@ -69,10 +69,10 @@ impl LaserScan {
         let (sin, cos) = angle.sin_cos();
         let time_s = beam as f64 * f64::from(self.time_increment_s);
         angle.is_finite().then(|| CloudPoint {
-            position_m: [length_m * cos, length_m * sin, 0.0],
             intensity: self.intensities.get(beam).copied().unwrap_or_default(),
             time_s: if time_s.is_finite() { time_s } else { 0.0 },
             is_return,
+            ..CloudPoint::hit([length_m * cos, length_m * sin, 0.0])
         })
     }
 }

@@ -60,5 +60,5 @@ fn point(reader: &mut WireReader<'_>, base_s: f64) -> Decoded<CloudPoint> {
     // Points without a return are all zeros.
     let is_return = position_m.iter().all(|m| m.is_finite()) && position_m != [0.0; 3];
     let position_m = if is_return { position_m } else { [f64::NAN; 3] };
-    Ok(CloudPoint { position_m, intensity, time_s, is_return })
+    Ok(CloudPoint { intensity, time_s, is_return, ..CloudPoint::hit(position_m) })
 }

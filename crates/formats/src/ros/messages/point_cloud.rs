@@ -82,12 +82,9 @@ impl<'a> PointCloud<'a> {
             let (intensity, time_s) = (value(&mut intensity)?, f64::from(value(&mut time)?));
             // As in `PointCloud2`, points without a return are NaN or all zeros.
             let is_return = position_m.iter().all(|m| m.is_finite()) && position_m != [0.0; 3];
-            Ok(CloudPoint {
-                position_m: if is_return { position_m } else { [f64::NAN; 3] },
-                intensity,
-                time_s: if time_s.is_finite() { time_s } else { 0.0 },
-                is_return,
-            })
+            let position_m = if is_return { position_m } else { [f64::NAN; 3] };
+            let time_s = if time_s.is_finite() { time_s } else { 0.0 };
+            Ok(CloudPoint { intensity, time_s, is_return, ..CloudPoint::hit(position_m) })
         })
     }
 }

@@ -218,6 +218,8 @@ impl<'a> PointCloud2<'a> {
             position_m: if is_return { position_m } else { [f64::NAN; 3] },
             intensity: self.intensity.map_or(0.0, |column| self.value(point, column) as f32),
             time_s: self.time.map_or(0.0, |time| self.time_s(point, time)),
+            colour: None,
+            class: None,
             is_return,
         }
     }
