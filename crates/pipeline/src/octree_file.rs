@@ -6,7 +6,7 @@ use voxtile::octree::{self, Leaf, OctreeFile};
 use voxtile::space::{Grid, MortonCode};
 use voxtile::{Error, Result};
 use voxtile_formats::read::open_input;
-use voxtile_formats::write::VoxelRow;
+use voxtile_formats::write::{RowLayers, VoxelRow};
 
 /// Limit for the voxels of a file when its pruned leaves are expanded: a file of twenty bytes can represent 2^48
 /// voxels.
