@@ -4,7 +4,7 @@ use super::response::gzip;
 use voxtile::mapper::MapView;
 use voxtile::scan::Stop;
 use voxtile::space::{Aabb, VoxelBox};
-use voxtile::{Point, Result};
+use voxtile::{Error, Point, Result};
 use voxtile_distance::{DistanceOptions, MapDistances, VoxelDistance};
 use voxtile_pipeline::AnyMap;
 
@@ -23,7 +23,8 @@ const OBSTACLE: u8 = 1;
 /// Value of a distance of almost 0; that of the cap is 255.
 const NEAREST: u8 = 2;
 
-/// Returns the distances in the layer of a point, compressed with gzip, as `docs/view.md` describes.
+/// Returns the distances in the layer of a point, compressed with gzip, as `docs/view.md` describes. Distances near
+/// damaged tiles are unknown.
 ///
 /// # Errors
 ///
@@ -39,7 +40,12 @@ pub fn distance_slice(map: &AnyMap, around: Point, max_distance_m: f64, stop: &S
         let end = |from: i32, k: usize| from.saturating_add(SQUARE_EDGE).min(voxels.end[k]);
         let [min, max] = [[x, y, voxels.min[2]], [end(x, 0), end(y, 1), voxels.end[2]]]
             .map(|corner| corner.map(|k| f64::from(k) * grid.resolution_m()));
-        let field = map.distance_field(&Aabb { min, max }, options)?;
+        let field = match map.distance_field(&Aabb { min, max }, options) {
+            Ok(field) => field,
+            // The page reports damaged tiles. The square remains unknown.
+            Err(Error::Damaged { .. }) => continue,
+            Err(error) => return Err(error),
+        };
         let VoxelBox { min, end } = field.voxel_box().intersection(&voxels);
         for (y, x) in (min[1]..end[1]).flat_map(|y| (min[0]..end[0]).map(move |x| (y, x))) {
             let at = (y - voxels.min[1]) as usize * width + (x - voxels.min[0]) as usize;
@@ -141,6 +147,21 @@ mod tests {
             }
             assert!(known > 100 && values.len() == width * height && (around[0] < 0.0 || obstacles > 10));
         }
+    }
+
+    #[test]
+    fn surroundings_of_a_damaged_tile_are_unknown() {
+        let (folder, map) = map_of((0..70).map(|k| [0.5 * f64::from(k) - 2.0, 3.05, 0.05]).collect());
+        let (_, _, whole) = slice(&map, [16.0, 0.0, 0.05], 0.5);
+        let tile = folder.path().join("map/tile_1_1_0");
+        for entry in std::fs::read_dir(&tile).unwrap() {
+            std::fs::write(entry.unwrap().path(), "damage").unwrap();
+        }
+        let map = MapReader::open(folder.path().join("map"), 1 << 20).unwrap();
+        let (_, _, values) = slice(&AnyMap::Map(Box::new(map)), [16.0, 0.0, 0.05], 0.5);
+        assert!(values.iter().zip(&whole).all(|(value, whole)| *value == UNKNOWN || value == whole));
+        let known = |values: &[u8]| values.iter().filter(|value| **value != UNKNOWN).count();
+        assert!((1..known(&whole)).contains(&known(&values)));
     }
 
     #[test]

@@ -43,16 +43,20 @@ impl FieldFolder {
     pub(super) fn open_to_write(disk: Arc<dyn FieldDisk>, folder: &Path) -> Result<(Self, File)> {
         check_outside_of_maps(folder)?;
         let field = Self::on(disk, folder);
+        let in_use = || {
+            let hint = "choose an empty folder, or one with a distance field";
+            Error::AlreadyExists { path: folder.to_owned(), hint }
+        };
         match field.disk.list(folder) {
             Ok(names) => {
                 let is_own = |name: &String| [LOCK, TILES].iter().any(|own| name == own);
                 let is_field = names.iter().any(|name| name == INDEX);
                 if !is_field && !names.iter().all(is_own) {
-                    let hint = "choose an empty folder, or one with a distance field";
-                    return Err(Error::AlreadyExists { path: folder.to_owned(), hint });
+                    return Err(in_use());
                 }
             }
             Err(error) if error.kind() == io::ErrorKind::NotFound => {}
+            Err(error) if error.kind() == io::ErrorKind::NotADirectory => return Err(in_use()),
             Err(error) => return Err(Error::io(folder, "list", error)),
         }
         field.disk.create_folder(&field.tiles).map_err(|error| Error::io(&field.tiles, "create", error))?;
