@@ -37,8 +37,3 @@ pub struct DistanceAndGradient {
     /// [`Distance::Within`].
     pub gradient: [f64; 3],
 }
-
-impl DistanceAndGradient {
-    /// No distance and no gradient.
-    pub(crate) const UNKNOWN: Self = Self { distance: Distance::Unknown, gradient: [0.0; 3] };
-}

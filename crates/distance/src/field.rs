@@ -228,45 +228,19 @@ impl DistanceField {
     pub fn distance_and_gradient_at(&self, points_m: &[Point]) -> Vec<DistanceAndGradient> {
         /// Points of a task of a core.
         const TOGETHER: usize = 1024;
-        let mut found = vec![DistanceAndGradient::UNKNOWN; points_m.len()];
-        let tasks = points_m.par_chunks(TOGETHER).zip(found.par_chunks_mut(TOGETHER));
-        tasks.for_each(|(points_m, found)| self.gradients_at(points_m, found));
-        found
-    }
-
-    /// As [`DistanceField::gradient_at`], for many points.
-    fn gradients_at(&self, points_m: &[Point], found: &mut [DistanceAndGradient]) {
-        /// Points whose voxels are read before their distances are computed, so that the memory accesses overlap.
-        const GROUP: usize = 16;
-        let mut corners = [const { None }; GROUP];
-        for (points_m, found) in points_m.chunks(GROUP).zip(found.chunks_mut(GROUP)) {
-            for (corners, &point_m) in corners.iter_mut().zip(points_m) {
-                *corners = self.corners_around(point_m);
-            }
-            for (found, corners) in found.iter_mut().zip(&corners) {
-                *found = self.interpolated(corners.as_ref());
-            }
-        }
+        points_m.par_iter().with_min_len(TOGETHER).map(|&point_m| self.gradient_at(point_m)).collect()
     }
 
     #[inline]
     fn gradient_at(&self, point_m: Point) -> DistanceAndGradient {
-        self.interpolated(self.corners_around(point_m).as_ref())
-    }
-
-    #[inline]
-    fn interpolated(&self, corners: Option<&(Between, [VoxelDistance; 8])>) -> DistanceAndGradient {
-        corners.map_or(DistanceAndGradient::UNKNOWN, |(between, corners)| {
-            between.interpolate(*corners, &self.scale)
-        })
-    }
-
-    /// Returns the distances of the eight voxels around a point; `None` unless all are in the field.
-    #[inline]
-    fn corners_around(&self, point_m: Point) -> Option<(Between, [VoxelDistance; 8])> {
-        let between = Between::of(&self.grid, point_m)?;
-        let low = self.extent.place_of(between.lowest)?;
-        self.extent.place_of(between.lowest.map(|k| k.saturating_add(1)))?;
+        let unknown = DistanceAndGradient { distance: Distance::Unknown, gradient: [0.0; 3] };
+        let Some(between) = Between::of(&self.grid, point_m) else { return unknown };
+        let (Some(low), Some(_)) = (
+            self.extent.place_of(between.lowest),
+            self.extent.place_of(between.lowest.map(|k| k.saturating_add(1))),
+        ) else {
+            return unknown;
+        };
         let distances = self.lines.as_flattened();
         let z_step = self.chunks * LANES;
         let y_step = self.extent.size[2] * z_step;
@@ -274,7 +248,7 @@ impl DistanceField {
         let corners = std::array::from_fn(|k| {
             VoxelDistance(distances[first + (k & 1) + (k >> 1 & 1) * y_step + (k >> 2) * z_step])
         });
-        Some((between, corners))
+        between.interpolate(corners, &self.scale)
     }
 
     /// Checks a path, given by its corners in metres: whether all of it is at least `radius_m` away from obstacles.

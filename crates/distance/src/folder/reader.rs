@@ -257,7 +257,7 @@ impl Cursor<'_> {
     }
 
     fn gradient_at(&mut self, point_m: Point) -> Result<DistanceAndGradient> {
-        let unknown = DistanceAndGradient::UNKNOWN;
+        let unknown = DistanceAndGradient { distance: Distance::Unknown, gradient: [0.0; 3] };
         let Some(between) = Between::of(&self.reader.grid, point_m) else { return Ok(unknown) };
         let mut corners = [VoxelDistance::UNKNOWN; 8];
         for (number, corner) in corners.iter_mut().enumerate() {
