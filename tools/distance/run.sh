@@ -66,6 +66,9 @@ One thread. Voxels are those of the output; the surroundings of boxes within the
 map, computes and writes a field of all its tiles; `box in memory` reads the map and computes one box. `edt` and `scipy`
 transform the obstacles of the same box, which are in memory already; they have no cap.
 
+voxblox and FIESTA are not in the table: PyPI, Debian and npm have no package of them, and their sources need ROS. Their
+published RMSE to the occupancy's own truth is 0.059 m and 0.045 m, 0.012 m at best; here it is 0.
+
 | set | what | voxel | cap | M voxels | s | M voxels/s | |
 |---|---|---:|---:|---:|---:|---:|---|
 PAGE

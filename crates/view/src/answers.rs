@@ -1,5 +1,6 @@
 //! Computes responses. This may read tiles, so it runs on blocking threads.
 
+use super::distance_slice::distance_slice;
 use super::map_state::Shown;
 use super::moving::moving;
 use super::response::{Answer, Keep};
@@ -10,6 +11,7 @@ use serde_json::{Value, json};
 use std::sync::Arc;
 use voxtile::mapper::MapView;
 use voxtile::query::UnknownAs;
+use voxtile::scan::Stop;
 use voxtile::space::{Aabb, VoxelIndex};
 use voxtile::{Error, Point, Queries, Result};
 use voxtile_pipeline::AnyMap;
@@ -49,13 +51,14 @@ fn describe(number: usize, map: &ServedMap) -> Value {
     })
 }
 
-/// Responds to a request for a map. Returns `None` if it needs levels that are not built yet and may not be built here.
+/// Responds to a request for a map; `stop` ends the work early. Returns `None` if it needs levels that are not built yet and may not be built here.
 pub fn of_map(
     maps: &[Arc<ServedMap>],
     id: &MapId,
     thing: &Thing,
     version: Option<u64>,
     makes: Makes,
+    stop: &Stop,
 ) -> Option<Answer> {
     let nothing = || Answer::error(StatusCode::NOT_FOUND, "no such map, snapshot or node");
     let Some(map) = maps.get(id.number) else { return Some(nothing()) };
@@ -68,7 +71,7 @@ pub fn of_map(
         }
     } else {
         map.query_map(id).and_then(|found| match found {
-            Some(found) => query_result(found.map(), thing, version),
+            Some(found) => query_result(found.map(), thing, version, stop),
             None => Ok(None),
         })
     };
@@ -76,7 +79,8 @@ pub fn of_map(
         Ok(answer) => answer.unwrap_or_else(nothing),
         Err(error) => {
             let status = status_of(&error);
-            if status.is_server_error() {
+            // Without a client, nothing has failed.
+            if status.is_server_error() && !matches!(error, Error::Stopped) {
                 log::warn!("{error:#}");
             }
             Answer::error(status, &format!("{error:#}"))
@@ -109,12 +113,14 @@ fn of_levels(shown: &Shown, thing: &Thing, version: Option<u64>) -> Result<Optio
         Thing::Tileset => Some(Answer::json(shown.tileset()?)),
         Thing::Subtree(key) => shown.subtree(*key)?.map(Answer::json).map(kept),
         Thing::Node(key, kind) => shown.node(*key, *kind)?.map(|bytes| Answer::bytes(bytes, keep)),
-        Thing::Query(_) | Thing::Raycast(..) | Thing::Trajectory | Thing::Moving => None,
+        Thing::Query(_) | Thing::Raycast(..) | Thing::Trajectory | Thing::Moving | Thing::Distances(..) => {
+            None
+        }
     })
 }
 
 /// Responds from the map alone, without levels. `version` is that of the marks that the client has.
-fn query_result(map: &AnyMap, thing: &Thing, version: Option<u64>) -> Result<Option<Answer>> {
+fn query_result(map: &AnyMap, thing: &Thing, version: Option<u64>, stop: &Stop) -> Result<Option<Answer>> {
     let answer = match thing {
         Thing::Query(point) => query(map, *point)?,
         Thing::Raycast(from, to) => raycast(map, *from, *to)?,
@@ -123,6 +129,10 @@ fn query_result(map: &AnyMap, thing: &Thing, version: Option<u64>) -> Result<Opt
             json!({ "scans": scans, "points": points })
         }
         Thing::Moving => return Ok(Some(Answer::bytes(moving(map, version)?, Keep::No))),
+        Thing::Distances(around, cap_m) => {
+            let bytes = distance_slice(map, *around, *cap_m, stop)?;
+            return Ok(Some(Answer::bytes(bytes, Keep::No)));
+        }
         Thing::Tileset | Thing::Subtree(_) | Thing::Node(..) => return Ok(None),
     };
     Ok(Some(Answer::json(answer)))

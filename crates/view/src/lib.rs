@@ -7,6 +7,7 @@
 //!         -> Route     parsing of paths                             route, token
 //!         -> answers   JSON of a query, a tileset, bytes of a node  answers
 //!                      points of kept scans that are marked         moving
+//!                      distances of a layer of voxels               distance_slice
 //!         -> metrics   text for Prometheus                          view_metrics
 //!            ServedMap one map that another process may write       served_map
 //!            MapState  one state of it: a flush or a snapshot       map_state, node_cache
@@ -18,6 +19,7 @@ mod answer_memory;
 mod answers;
 mod client_stream;
 mod connections;
+mod distance_slice;
 mod map_state;
 mod moving;
 mod node_cache;

@@ -40,6 +40,8 @@ pub enum Thing {
     Trajectory,
     /// Points of kept scans that are marked as moving.
     Moving,
+    /// Distances to obstacles in the layer of a point, and their cap in metres.
+    Distances(Point, f64),
 }
 
 impl Route {
@@ -74,6 +76,11 @@ impl Thing {
         matches!(self, Self::Moving)
     }
 
+    /// Returns whether the resource needs the computation of distances.
+    pub fn takes_distances(&self) -> bool {
+        matches!(self, Self::Distances(..))
+    }
+
     /// Returns whether the resource needs the levels of a state.
     pub fn takes_levels(&self) -> bool {
         matches!(self, Self::Tileset | Self::Subtree(_) | Self::Node(..))
@@ -85,6 +92,10 @@ impl Thing {
             "tileset.json" => Some(Self::Tileset),
             "trajectory.json" => Some(Self::Trajectory),
             "moving.bin" => Some(Self::Moving),
+            "distances.bin" => {
+                let [around, cap_m] = ["at", "cap"].map(|name| field(question, name));
+                Some(Self::Distances(point(around?)?, cap_m?.parse().ok()?))
+            }
             "query" => {
                 let number = |name| field(question, name)?.parse().ok();
                 Some(Self::Query(finite([number("x")?, number("y")?, number("z")?])?))
@@ -176,6 +187,11 @@ mod tests {
         assert_eq!(ray, Some(Route::Of(now, Thing::Raycast([0.0; 3], [1.0, 2.0, 3.0]))));
         let moving = route("/sesame_42/maps/0@b/moving.bin", Some("v=00ff"));
         assert!(matches!(moving, Some(Route::Of(_, Thing::Moving))), "{moving:?}");
+        let distances = route("/sesame_42/maps/0/distances.bin", Some("at=1,2,3&cap=0.5"));
+        assert!(
+            matches!(distances, Some(Route::Of(_, Thing::Distances([1.0, 2.0, 3.0], 0.5)))),
+            "{distances:?}"
+        );
         let name = |name| At::Snapshot(SnapshotName::new(name).unwrap());
         let since = MapId { number: 0, at: name("b"), since: Some(name("a")) };
         assert_eq!(route("/sesame_42/maps/0@b~a/tileset.json", None), Some(Route::Of(since, Thing::Tileset)));
@@ -222,5 +238,8 @@ mod tests {
             assert_eq!(route("/sesame_42/maps/0/raycast", Some(question)), None, "{question}");
         }
         assert_eq!(route("/sesame_42/maps/0/node/0/0/0/0.vox", Some("what=everything")), None);
+        for question in ["at=1,2,3", "cap=1", "at=nan,0,0&cap=1", "at=1,2,3&cap=x"] {
+            assert_eq!(route("/sesame_42/maps/0/distances.bin", Some(question)), None, "{question}");
+        }
     }
 }

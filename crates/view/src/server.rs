@@ -26,6 +26,7 @@ use std::sync::Arc;
 use std::time::Duration;
 use tokio::sync::watch;
 use tokio_io_timeout::TimeoutStream;
+use voxtile::scan::Stop;
 
 /// A connection without a request for this time is closed, so that silent clients cannot hold connections.
 const REQUEST_TIMEOUT: Duration = Duration::from_secs(5);
@@ -50,6 +51,8 @@ pub struct Server {
     making: Work,
     /// Reads kept scans, for one response at a time. This takes seconds, too.
     reading: Work,
+    /// Computes distances on all cores, for one response at a time.
+    measuring: Work,
     memory: AnswerMemory,
     connections: Connections,
     responses: Responses,
@@ -64,10 +67,23 @@ impl Server {
     ) -> Self {
         let threads = std::thread::available_parallelism().map_or(2, usize::from);
         let id = format!("{:016x}", RandomState::new().build_hasher().finish());
-        let [work, making, reading] = [threads, 1, 1].map(Work::new);
+        let [work, making, reading, measuring] = [threads, 1, 1, 1].map(Work::new);
         let memory = AnswerMemory::default();
         let (connections, responses) = (Connections::new(), Responses::default());
-        Self { id, maps, token, address, changed, work, making, reading, memory, connections, responses }
+        Self {
+            id,
+            maps,
+            token,
+            address,
+            changed,
+            work,
+            making,
+            reading,
+            measuring,
+            memory,
+            connections,
+            responses,
+        }
     }
 
     pub fn run(self, listener: TcpListener) -> anyhow::Result<()> {
@@ -223,11 +239,16 @@ impl Server {
             return self.work.run(move || answers::maps(&server.maps)).await.unwrap_or_else(ending);
         };
         let version = question.and_then(version_in);
+        let abandoned = StopOnDrop(Stop::default());
         let ask = |makes| {
-            let (server, id, thing) = (self.clone(), id.clone(), thing.clone());
-            move || answers::of_map(&server.maps, &id, &thing, version, makes)
+            let (server, id, thing, stop) = (self.clone(), id.clone(), thing.clone(), abandoned.0.clone());
+            move || answers::of_map(&server.maps, &id, &thing, version, makes, &stop)
         };
-        let first = if thing.takes_scans() { &self.reading } else { &self.work };
+        let first = match &thing {
+            thing if thing.takes_scans() => &self.reading,
+            thing if thing.takes_distances() => &self.measuring,
+            _ => &self.work,
+        };
         let answer = match first.run(ask(Makes::Nothing)).await {
             // Build the levels first.
             Some(None) => self.making.run(ask(Makes::Levels)).await,
@@ -270,6 +291,15 @@ impl Server {
         response.headers_mut().insert(CACHE_CONTROL, HeaderValue::from_static("no-store"));
         *response.body_mut() = body.boxed_unsync();
         response
+    }
+}
+
+/// Stops the work for a response when its client has disconnected: the response is dropped then.
+struct StopOnDrop(Stop);
+
+impl Drop for StopOnDrop {
+    fn drop(&mut self) {
+        self.0.set();
     }
 }
 

@@ -1,5 +1,6 @@
 use super::boxes::boxes_of;
 use super::damage::make_unknown;
+use super::field_disk::{FieldDisk, FsDisk};
 use super::field_folder::FieldFolder;
 use super::index::{Index, IndexedTile, chunks_of, distance_of_absent};
 use super::tile_cache::TileCache;
@@ -18,6 +19,7 @@ use rayon::prelude::*;
 use rustc_hash::FxHashMap;
 use serde::Serialize;
 use std::path::Path;
+use std::sync::Arc;
 use voxtile::mapper::MapView;
 use voxtile::scan::Stop;
 use voxtile::space::{TileBox, VoxelBox};
@@ -136,11 +138,22 @@ pub fn compute_field<V: MapView>(
     options: &FieldOptions,
     progress: &(dyn Fn(u64, u64) + Sync),
 ) -> Result<FieldReport> {
+    compute_field_on(Arc::new(FsDisk), map, folder, options, progress)
+}
+
+/// As [`compute_field`], with other operations on files.
+pub(super) fn compute_field_on<V: MapView>(
+    disk: Arc<dyn FieldDisk>,
+    map: &V,
+    folder: &Path,
+    options: &FieldOptions,
+    progress: &(dyn Fn(u64, u64) + Sync),
+) -> Result<FieldReport> {
     let grid = map.config().grid;
     let distances = options.distances;
     let cap = Cap::of(distances.max_distance_m, grid.resolution_m())?;
     let region = region_of(map, options)?;
-    let (field, _lock) = FieldFolder::open_to_write(folder)?;
+    let (field, _lock) = FieldFolder::open_to_write(disk, folder)?;
     let edge = grid.voxels_per_tile_edge() as usize;
     let tiles = map.tile_indices();
     let wanted = wanted_tiles(map, &tiles, region, cap, &distances);

@@ -1,10 +1,12 @@
+use super::field_disk::{FieldDisk, FsDisk, UNFINISHED};
 use super::index::Index;
 use super::tile_file;
 use super::tile_key::TileKey;
 use std::collections::BTreeSet;
 use std::fs::{self, File, TryLockError};
-use std::io::{self, Write};
+use std::io;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use voxtile::store::check_outside_of_maps;
 use voxtile::{Error, Result, TileIndex};
 
@@ -13,6 +15,7 @@ use voxtile::{Error, Result, TileIndex};
 pub(super) struct FieldFolder {
     folder: PathBuf,
     tiles: PathBuf,
+    disk: Arc<dyn FieldDisk>,
 }
 
 const INDEX: &str = "field.json";
@@ -20,14 +23,16 @@ const LOCK: &str = "writer.lock";
 const TILES: &str = "tiles";
 /// End of the names of tiles.
 const EXTENSION: &str = ".vxdist";
-/// Beginning of the names of unfinished files.
-const UNFINISHED: &str = ".voxtile-";
 /// Largest `field.json` that is read: ten million tiles.
 const MAX_INDEX_BYTES: u64 = 1 << 30;
 
 impl FieldFolder {
     pub(super) fn new(folder: &Path) -> Self {
-        Self { folder: folder.to_owned(), tiles: folder.join(TILES) }
+        Self::on(Arc::new(FsDisk), folder)
+    }
+
+    fn on(disk: Arc<dyn FieldDisk>, folder: &Path) -> Self {
+        Self { folder: folder.to_owned(), tiles: folder.join(TILES), disk }
     }
 
     /// Creates the folder, or checks that it contains a field, and locks it against other writers.
@@ -35,24 +40,26 @@ impl FieldFolder {
     /// # Errors
     ///
     /// Fails if the folder is in a map or has other content, if another process writes the field, or with an I/O error.
-    pub(super) fn open_to_write(folder: &Path) -> Result<(Self, File)> {
+    pub(super) fn open_to_write(disk: Arc<dyn FieldDisk>, folder: &Path) -> Result<(Self, File)> {
         check_outside_of_maps(folder)?;
-        let field = Self::new(folder);
-        match fs::read_dir(folder) {
-            Ok(entries) => {
-                let names = entries.map(|entry| Ok(entry?.file_name())).collect::<io::Result<Vec<_>>>();
-                let names = names.map_err(|error| Error::io(folder, "list", error))?;
-                let is_own = |name: &std::ffi::OsString| [LOCK, TILES].iter().any(|own| name == own);
+        let field = Self::on(disk, folder);
+        let in_use = || {
+            let hint = "choose an empty folder, or one with a distance field";
+            Error::AlreadyExists { path: folder.to_owned(), hint }
+        };
+        match field.disk.list(folder) {
+            Ok(names) => {
+                let is_own = |name: &String| [LOCK, TILES].iter().any(|own| name == own);
                 let is_field = names.iter().any(|name| name == INDEX);
                 if !is_field && !names.iter().all(is_own) {
-                    let hint = "choose an empty folder, or one with a distance field";
-                    return Err(Error::AlreadyExists { path: folder.to_owned(), hint });
+                    return Err(in_use());
                 }
             }
             Err(error) if error.kind() == io::ErrorKind::NotFound => {}
+            Err(error) if error.kind() == io::ErrorKind::NotADirectory => return Err(in_use()),
             Err(error) => return Err(Error::io(folder, "list", error)),
         }
-        fs::create_dir_all(&field.tiles).map_err(|error| Error::io(&field.tiles, "create", error))?;
+        field.disk.create_folder(&field.tiles).map_err(|error| Error::io(&field.tiles, "create", error))?;
         let path = folder.join(LOCK);
         let lock = File::options().create(true).truncate(false).write(true).open(&path);
         let lock = lock.map_err(|error| Error::io(&path, "create", error))?;
@@ -85,7 +92,7 @@ impl FieldFolder {
                 })
             }
             Ok(_) => {
-                let bytes = fs::read(&path).map_err(|error| Error::io(&path, "read", error))?;
+                let bytes = self.disk.read(&path).map_err(|error| Error::io(&path, "read", error))?;
                 Index::parse(&bytes, &path).map(Some)
             }
             Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(None),
@@ -101,14 +108,11 @@ impl FieldFolder {
     pub(super) fn write_index(&self, index: &Index) -> Result<()> {
         let path = self.folder.join(INDEX);
         let write = || {
-            let mut file = self.unfinished(&self.folder)?;
-            let mut out = io::BufWriter::new(file.as_file_mut());
-            serde_json::to_writer(&mut out, index)?;
-            out.flush()?;
-            drop(out);
-            file.as_file().sync_all()?;
-            file.persist(&path)?;
-            if cfg!(unix) { File::open(&self.folder)?.sync_all() } else { Ok(()) }
+            let mut file = self.disk.create(&self.folder)?;
+            self.disk.write(&mut file, &serde_json::to_vec(index)?)?;
+            self.disk.sync(file.path())?;
+            self.disk.rename(file, &path)?;
+            self.disk.sync(&self.folder)
         };
         write().map_err(|error: io::Error| Error::io(&path, "write", error))
     }
@@ -126,21 +130,11 @@ impl FieldFolder {
     pub(super) fn write_tile(&self, tile: TileIndex, key: TileKey, bytes: &[u8]) -> Result<()> {
         let path = self.tile_path(tile, key);
         let write = || {
-            let mut file = self.unfinished(&self.tiles)?;
-            file.write_all(bytes)?;
-            file.persist(&path)?;
-            Ok(())
+            let mut file = self.disk.create(&self.tiles)?;
+            self.disk.write(&mut file, bytes)?;
+            self.disk.rename(file, &path)
         };
         write().map_err(|error: io::Error| Error::io(&path, "write", error))
-    }
-
-    fn unfinished(&self, folder: &Path) -> io::Result<tempfile::NamedTempFile> {
-        let mut builder = tempfile::Builder::new();
-        builder.prefix(UNFINISHED);
-        // The umask determines the permissions, as for any new file.
-        #[cfg(unix)]
-        builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
-        builder.tempfile_in(folder)
     }
 
     /// Reads and checks the file of a tile.
@@ -150,7 +144,7 @@ impl FieldFolder {
     /// Fails if the file is missing, damaged or of another key.
     pub(super) fn read_tile(&self, tile: TileIndex, edge: usize, key: TileKey) -> Result<Vec<u8>> {
         let path = self.tile_path(tile, key);
-        let bytes = fs::read(&path).map_err(|error| Error::io(&path, "read", error))?;
+        let bytes = self.disk.read(&path).map_err(|error| Error::io(&path, "read", error))?;
         tile_file::check(&bytes, tile, edge, key).map_err(|error| error.in_input(&path))?;
         Ok(bytes)
     }
@@ -163,14 +157,12 @@ impl FieldFolder {
     pub(super) fn remove_others(&self, listed: impl Iterator<Item = (TileIndex, TileKey)>) -> Result<()> {
         let listed: BTreeSet<String> = listed.map(|(tile, key)| tile_name(tile, key)).collect();
         for folder in [&self.tiles, &self.folder] {
-            let entries = fs::read_dir(folder).map_err(|error| Error::io(folder, "list", error))?;
-            for entry in entries {
-                let entry = entry.map_err(|error| Error::io(folder, "list", error))?;
-                let Ok(name) = entry.file_name().into_string() else { continue };
+            let names = self.disk.list(folder).map_err(|error| Error::io(folder, "list", error))?;
+            for name in names {
                 let is_old = name.ends_with(EXTENSION) && !listed.contains(&name);
                 if is_old || name.starts_with(UNFINISHED) {
-                    let path = entry.path();
-                    fs::remove_file(&path).map_err(|error| Error::io(&path, "remove", error))?;
+                    let path = folder.join(name);
+                    self.disk.remove(&path).map_err(|error| Error::io(&path, "remove", error))?;
                 }
             }
         }

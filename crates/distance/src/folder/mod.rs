@@ -7,6 +7,7 @@
 //!   -> Solver -> one file per tile                                  compute, tile_file
 //!   -> field.json, which makes them the field                       index
 //! FieldReader <- files, an LRU of tiles                             reader
+//! all files                                                        field_folder, field_disk
 //! ```
 //!
 //! The name of a tile's file has its key, a hash of the parameters and of the versions of all tiles within the cap. So a
@@ -16,6 +17,9 @@
 mod boxes;
 mod compute;
 mod damage;
+#[cfg(test)]
+mod fault_tests;
+mod field_disk;
 mod field_folder;
 mod index;
 mod reader;

@@ -348,6 +348,7 @@ fn foreign_folders_are_refused_and_remain() {
     assert!(
         attempt(&foreign).contains("empty folder") && fs::read(foreign.join("file")).unwrap() == b"content"
     );
+    assert!(attempt(&foreign.join("file")).contains("empty folder"));
     assert!(attempt(&map_path.join("field")).contains("inside the map"));
     assert!(attempt(&map_path).contains("content"), "{}", attempt(&map_path));
     assert!(message_of(FieldReader::open(&foreign, 0)).contains("voxtile distance"));

@@ -2,9 +2,13 @@ use crate::random_map::{TILE_SIZES_M, centers_box, config, grow, random_options}
 use testkit::memory_folder::memory_folder;
 use testkit::random_scans::Random;
 use testkit::support::{cases, message_of};
-use voxtile::mapper::MapView;
-use voxtile::{InMemoryMapper, MapOptions, Point, Scan};
-use voxtile_distance::{DistanceField, DistanceOptions, LiveDistances, MapDistances, UnknownRule};
+use voxtile::mapper::{MapReader, MapView, OutOfCoreTileMapper};
+use voxtile::scan::PointBatch;
+use voxtile::{InMemoryMapper, MapOptions, Mapper, Point, Scan};
+use voxtile_distance::{
+    DistanceField, DistanceOptions, FieldOptions, FieldReader, LiveDistances, MapDistances, UnknownRule,
+    VoxelDistance, compute_field,
+};
 use voxtile_local::{LocalMap, LocalParameters, Obstacle};
 
 const SIZE_M: [f64; 3] = [3.0, 4.1, 1.7];
@@ -17,26 +21,78 @@ fn assert_equal(live: &LiveDistances, map: &impl MapView, options: DistanceOptio
     assert!(field.to_array() == expected.to_array(), "case {case}: {options:?}");
 }
 
+/// Makes some obstacles of a map free.
+fn clear_obstacles(map: &mut OutOfCoreTileMapper, view: &impl MapView, random: &mut Random) {
+    let tiles = view.tile_indices();
+    let mut points = Vec::new();
+    for _ in 0..tiles.len().min(8) {
+        let tile = tiles[random.below(tiles.len() as u64) as usize];
+        let occupied = view.voxels_from(tile, view.config().occupied_log_odds()).unwrap();
+        points.extend(
+            occupied
+                .iter()
+                .filter(|_| random.below(2) == 0)
+                .map(|voxel| view.config().grid.center_m(voxel.index)),
+        );
+    }
+    let is_occupied = vec![false; points.len()];
+    let misses = PointBatch { points: &points, intensities: None, is_occupied: &is_occupied };
+    // More misses than a voxel has hits.
+    (0..12).for_each(|_| map.batch_update(&misses).map(drop).unwrap());
+}
+
+/// Voxels that are obstacles in one field and not in another of the same box.
+fn vanished(before: &DistanceField, after: &DistanceField) -> usize {
+    if before.voxel_box() != after.voxel_box() {
+        return 0;
+    }
+    let is_obstacle = |distance: &VoxelDistance| distance.to_bits() <= 0;
+    let both = before.to_array().into_iter().zip(after.to_array());
+    both.filter(|(before, after)| is_obstacle(before) && !is_obstacle(after)).count()
+}
+
 #[test]
 fn random_lives_equal_fields_computed_at_once() {
-    for case in 0..cases(12, 200) {
+    let (mut evicted, mut cleared) = (0, 0);
+    for case in 0..cases(18, 300) {
         let random = &mut Random(case);
         let folder = memory_folder();
-        let map_options =
-            MapOptions::new().config(config(TILE_SIZES_M[case as usize % 3])).create_if_missing(true);
+        let config = config(TILE_SIZES_M[case as usize % 3]);
+        let map_options = MapOptions::new().config(config).create_if_missing(true);
+        // With few tiles in memory, updates read evicted ones.
+        let map_options = if case % 6 == 0 { map_options.memory_bytes(17 << 20) } else { map_options };
         let mut map = map_options.open(folder.path().join("map")).unwrap();
         let reader = map.reader().unwrap();
         let options = random_options(random);
         let mut live = LiveDistances::new(SIZE_M, options).unwrap();
         let mut robot: Point = random.point([0.0; 3], 1.0);
         for _ in 0..12 {
-            grow(&mut map, random, robot);
+            match random.below(4) {
+                0 => clear_obstacles(&mut map, &reader.view(), random),
+                _ => grow(&mut map, random, robot),
+            }
+            if random.below(4) == 0 {
+                map.flush().unwrap();
+            }
             robot = random.point(robot, 0.8);
-            let view = reader.view();
+            let (view, before) = (reader.view(), live.field());
             live.update(&view, robot).unwrap();
             assert_equal(&live, &view, options, case);
+            evicted += view.tile_indices().len() - view.cached_tile_indices().len();
+            cleared += before.map_or(0, |before| vanished(&before, &live.field().unwrap()));
         }
+        // The bulk field in a folder.
+        map.flush().unwrap();
+        let map = MapReader::open(folder.path().join("map"), 1 << 20).unwrap();
+        let path = folder.path().join("field");
+        let field = live.field().unwrap();
+        let region = centers_box(&field.grid(), &field.voxel_box());
+        let bulk = FieldOptions::new(options).with_region(region);
+        compute_field(&map, &path, &bulk, &|_, _| {}).unwrap();
+        let bulk = FieldReader::open(&path, 1 << 20).unwrap().load(&region).unwrap();
+        assert!(bulk.to_array() == field.to_array(), "case {case}: {options:?}");
     }
+    assert!(evicted > 0 && cleared > 0, "{evicted} evicted tiles, {cleared} obstacles that vanished");
 }
 
 #[test]
@@ -62,19 +118,27 @@ fn only_changes_are_computed_and_earlier_fields_remain() {
 
 #[test]
 fn fields_of_local_maps_follow_their_obstacles() {
+    let mut cleared = 0;
     for case in 0..cases(6, 60) {
         let random = &mut Random(70 + case);
-        let mut map = LocalMap::new(0.1, LocalParameters::local_mapping()).unwrap();
+        // With a limit, voxels are removed.
+        let limit = (case % 3 == 0).then_some(60);
+        let parameters = LocalParameters::local_mapping().with_max_voxels(limit);
+        let mut map = LocalMap::new(0.1, parameters).unwrap();
         let options = random_options(random);
         let obstacle = if case % 2 == 0 { Obstacle::Inflated } else { Obstacle::Occupied };
         let mut live = LiveDistances::new(SIZE_M, options).unwrap();
+        let mut robot: Point = [0.1, 0.0, 0.0];
         for _ in 0..10 {
-            let scan = testkit::random_scans::random_scan(random, [0.0; 3], 20);
+            robot = random.point(robot, 0.6);
+            let scan = testkit::random_scans::random_scan(random, robot, 20);
             map.insert_scan(&Scan { intensities: None, ..scan }).unwrap();
             let view = map.view().clone();
             let obstacles = view.obstacles(obstacle);
-            live.update_from_set(&obstacles, [0.1, 0.0, 0.0]).unwrap();
+            let before = live.field();
+            live.update_from_set(&obstacles, robot).unwrap();
             let field = live.field().unwrap();
+            cleared += before.map_or(0, |before| vanished(&before, &field));
             let region = centers_box(&field.grid(), &field.voxel_box());
             let expected = DistanceField::of_set(&obstacles, &region, options).unwrap();
             assert!(field.to_array() == expected.to_array(), "case {case}");
@@ -92,6 +156,7 @@ fn fields_of_local_maps_follow_their_obstacles() {
             assert_equal(&live, &archive, options, case);
         }
     }
+    assert!(cleared > 0);
 }
 
 #[test]

@@ -205,7 +205,7 @@ try {
   assert.ok(marked > 0.9 * passing.size);
   await browser.value('document.getElementById("theme").click(); voxtile.lookAt([100, 0.5, 1], [100, 2.5, 0])');
   await browser.ready();
-  const reds = async () => {
+  const count = async (isWanted) => {
     const { data } = await browser.call('Page.captureScreenshot', { format: 'png' });
     return browser.value(`(async () => {
       const image = new Image();
@@ -216,10 +216,11 @@ try {
       context.drawImage(image, 0, 0);
       const { data } = context.getImageData(0, 0, image.width - 264, image.height);
       let count = 0;
-      for (let k = 0; k < data.length; k += 4) count += Math.hypot(data[k] - 190, data[k + 1] - 18, data[k + 2] - 24) < 8;
+      for (let k = 0; k < data.length; k += 4) count += (${isWanted})(data[k], data[k + 1], data[k + 2]);
       return count;
     })()`);
   };
+  const reds = () => count('(r, g, b) => Math.hypot(r - 190, g - 18, b - 24) < 8');
   assert.ok(await reds() > 500, `${await reds()} red pixels`);
   await browser.value('document.getElementById("moving").click()');
   await browser.ready();
@@ -237,6 +238,36 @@ try {
   await browser.until(`${label} === 'no kept scans'`, 20);
   assert.deepEqual(browser.errors, []);
   step(`${marked} moving points are shown, follow clean and are hidden`);
+
+  // Distances at a height: obstacles are the occupied voxels of the layer.
+  await browser.value(`document.getElementById('fit').click(); document.getElementById('top').click();
+    document.getElementById('layer').value = 500; document.getElementById('distances').click()`);
+  await browser.until('voxtile.distances()?.values.length > 0', 20);
+  await browser.ready();
+  const layer = await browser.value('voxtile.distances()');
+  const z = Math.round(1000 * (layer.corner[2] + layer.edge / 2));
+  const ofLayer = [...exported(map)].filter((voxel) => Number(voxel.split(' ')[2]) === z);
+  const obstacles = layer.values.flatMap((value, k) => (value === 1
+    ? [[k % layer.size[0], Math.floor(k / layer.size[0])].map((at, axis) => Math.round(1000 * (layer.corner[axis] + (at + 0.5) * layer.edge))).join(' ')] : []));
+  assert.deepEqual(new Set(obstacles.map((voxel) => `${voxel} ${z}`)), new Set(ofLayer));
+  const known = layer.values.filter((value) => value > 1).length;
+  assert.ok(ofLayer.length > 30 && known > 200 && layer.values.includes(0), `${ofLayer.length} obstacles, ${known} free, some unknown`);
+  // The colours of obstacles, and of free voxels near to them and far away from them.
+  const drawn = async () => {
+    const near = (colour) => `(r, g, b) => Math.hypot(r - ${colour[0]}, g - ${colour[1]}, b - ${colour[2]}) < 4`;
+    return [await count(near([226, 230, 236])), await count(near([38, 13, 74]).replace('< 4', '< 60')), await count(near([38, 104, 142]).replace('< 4', '< 60'))];
+  };
+  const layerPixels = await drawn();
+  assert.ok(layerPixels.every((pixels) => pixels > 500), `${layerPixels} pixels`);
+  const message = (await (await fetch(`${url}maps/0/distances.bin?at=0,0,0&cap=0`)).json()).error;
+  assert.match(message, /from 0\.1 m to 18\.1 m/);
+  run('build', scan(7), '-o', map, '--append', '-q');
+  await browser.until(`voxtile.distances()?.values.filter((value) => value === 1).length > ${ofLayer.length}`, 20);
+  await browser.value('document.getElementById("distances").click()');
+  await browser.ready();
+  assert.equal((await drawn())[0], 0, 'the distances are hidden');
+  assert.deepEqual(browser.errors, []);
+  step(`distances at a height: ${layerPixels.join(', ')} pixels; they follow a build`);
 
   for (const [width, height, dark] of [[360, 640, false], [1280, 720, true]]) {
     await browser.size(width, height, dark);

@@ -9,7 +9,8 @@ export function readLink() {
     return list.length === count && list.every(Number.isFinite) ? list : null;
   };
   return { eye: numbers('eye', 3), to: numbers('to', 3), colour: fields.get('colour'), at: fields.get('at'), since: fields.get('since'),
-    threshold: fields.has('threshold') ? Number(fields.get('threshold')) : null, cut: numbers('cut', 6) };
+    threshold: fields.has('threshold') ? Number(fields.get('threshold')) : null, cut: numbers('cut', 6),
+    distances: numbers('distances', 2) };
 }
 
 export function writeLink(state) {

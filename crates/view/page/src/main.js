@@ -1,10 +1,11 @@
 // Controls of the page.
 
+import { coloursOf, readDistances } from './distances.js';
 import { readLink, writeLink } from './link.js';
 import { logOddsOf, observationsOf, probabilityOf } from './node.js';
 import { pointMaterial } from './material.js';
 import { readMoving } from './moving.js';
-import { CHANGES, LAYERS, MOVING, drawLegend } from './palette.js';
+import { CHANGES, LAYERS, MOVING, OBSTACLE, drawLegend } from './palette.js';
 import { centerOf, pick } from './pick.js';
 import { Viewer } from './viewer.js';
 
@@ -44,6 +45,12 @@ let pathNumber = 0;
 // Marked points of the first map that were loaded last, and the number of the last request for them.
 let moving = null;
 let movingNumber = 0;
+// Distances that are shown, and the request in progress.
+let distances = null;
+let distancesRequest = null;
+let distancesTimer = 0;
+// Voxels that the camera may move before distances around another place are loaded; the layer has 1024.
+const DISTANCES_STEP = 256;
 // Sliders of the cut, and their positions without a cut.
 const CUTS = ['x0', 'x1', 'y0', 'y1', 'z0', 'z1'];
 const OPEN = ['0', '1000', '0', '1000', '0', '1000'];
@@ -127,6 +134,7 @@ function showMaps() {
   paint();
   readPath();
   loadMoving();
+  loadDistances();
 }
 
 async function readPath() {
@@ -194,6 +202,66 @@ async function loadMoving() {
   viewer.wake();
 }
 
+// Height of the layer whose distances are shown: that of the center of a voxel.
+function layerHeight() {
+  const { low, high, resolution_m: edge } = maps[0];
+  return (Math.floor((low + (high - low) * $('layer').value / 1000) / edge + 1e-6) + 0.5) * edge;
+}
+
+// Loads the distances of the first map around the point that the camera looks at. A newer request cancels an older one.
+async function loadDistances() {
+  clearTimeout(distancesTimer);
+  distancesRequest?.abort();
+  distancesRequest = null;
+  const isOn = $('distances').checked;
+  $('distances-more').hidden = !isOn;
+  if (!isOn || !maps[0]) {
+    distances = null;
+    viewer.overlays.set('distances', null);
+    $('distances-out').value = '';
+    viewer.wake();
+    return;
+  }
+  const [id, cap, z] = [idOf(maps[0]).split('~')[0], Number($('cap').value), layerHeight()];
+  const around = [...viewer.toMap(viewer.flight.orbit.target.toArray()).slice(0, 2), z];
+  $('layer-out').value = metres(z);
+  $('cap-out').textContent = `${cap} m or more`;
+  $('distances-out').value = 'loading';
+  const request = new AbortController();
+  distancesRequest = request;
+  try {
+    const read = await readDistances(`maps/${id}/distances.bin?at=${around}&cap=${cap}`, request.signal);
+    distances = { ...read, around };
+    // On top of the voxels of the layer.
+    const low = [...read.corner.slice(0, 2), z + 0.52 * read.edge];
+    viewer.overlays.image('distances', low, read.size, read.edge, coloursOf(read.values));
+    $('distances-out').value = read.values.some(Boolean) ? '' : 'unknown here';
+  } catch (error) {
+    if (request.signal.aborted) return;
+    distances = null;
+    viewer.overlays.set('distances', null);
+    $('distances-out').value = 'not loaded';
+    say(`Cannot load the distances: ${error.message}`);
+  }
+  distancesRequest = null;
+  viewer.wake();
+}
+
+function loadDistancesSoon() {
+  if (!$('distances').checked) return;
+  $('layer-out').value = metres(layerHeight());
+  clearTimeout(distancesTimer);
+  distancesTimer = setTimeout(loadDistances, 200);
+}
+
+// Loads other distances when the camera looks at a place far from those that are shown.
+function followCamera() {
+  if (!distances || distancesRequest) return;
+  const target = viewer.toMap(viewer.flight.orbit.target.toArray());
+  const away = Math.max(...[0, 1].map((k) => Math.abs(target[k] - distances.around[k])));
+  if (away > DISTANCES_STEP * maps[0].resolution_m) loadDistancesSoon();
+}
+
 // --- Colours and cuts
 
 function paint() {
@@ -240,6 +308,8 @@ function cut() {
       $(`${axis}${end}-out`).value = isOpen ? 'all' : metres(at);
     }
   });
+  // Voxels above the distances would hide them.
+  if ($('distances').checked) viewer.cut.high[2] = Math.min(viewer.cut.high[2], layerHeight() + 0.25 * maps[0].resolution_m);
   viewer.wake();
   remember();
 }
@@ -332,6 +402,7 @@ function remember() {
     at: $('snapshot').value,
     since: $('since').value,
     cut: CUTS.some((id, k) => $(id).value !== OPEN[k]) ? CUTS.map((id) => Number($(id).value)) : null,
+    distances: $('distances').checked ? [Number($('layer').value), Number($('cap').value)] : null,
   }));
 }
 
@@ -346,6 +417,12 @@ function applyLink() {
   choose('since', link.since ?? '');
   $('threshold').value = link.threshold ?? 0;
   CUTS.forEach((id, k) => { $(id).value = link.cut?.[k] ?? OPEN[k]; });
+  $('distances').checked = link.distances !== null;
+  if (link.distances) {
+    $('layer').value = link.distances[0];
+    $('cap').value = link.distances[1];
+    if (!$('cap').value) $('cap').value = '2';
+  }
 }
 
 window.addEventListener('hashchange', () => {
@@ -411,6 +488,7 @@ async function change() {
   paint();
   readPath();
   loadMoving();
+  loadDistances();
 }
 
 // A hidden page closes its connection, because a browser has only six for all pages of a server. It receives missed
@@ -465,6 +543,16 @@ for (const kind of ['occupied', 'free', 'unknown']) {
 }
 $('path').addEventListener('change', showScan);
 $('moving').addEventListener('change', loadMoving);
+for (const id of ['distances', 'cap']) {
+  $(id).addEventListener('change', () => {
+    cut();
+    loadDistances();
+  });
+}
+$('layer').addEventListener('input', () => {
+  cut();
+  loadDistancesSoon();
+});
 $('bounds').addEventListener('change', () => {
   const { min, max } = allBounds();
   if ($('bounds').checked) viewer.overlays.box('bounds', min, max, 0x7d8594);
@@ -551,6 +639,7 @@ viewer.listeners.push(() => {
   }
 });
 viewer.flight.orbit.addEventListener('change', remember);
+viewer.flight.orbit.addEventListener('change', followCamera);
 
 // For tests and the console.
 window.voxtile = {
@@ -577,6 +666,7 @@ window.voxtile = {
     const { offsets, origin } = moving;
     return Array.from({ length: moving.count }, (_, k) => origin.map((at, axis) => at + offsets[3 * k + axis]));
   },
+  distances: () => distances && { ...distances, values: [...distances.values] },
   clickAt,
   screenOf(point) {
     const at = viewer.camera.position.clone().set(...viewer.toScene(point)).project(viewer.camera);
@@ -600,6 +690,8 @@ window.voxtile = {
 
 theme(scheme.matches);
 drawLegend($('legend'));
+drawLegend($('distances-legend'));
+$('obstacle-swatch').style.background = `rgb(${OBSTACLE})`;
 $('moving-swatch').style.background = `rgb(${MOVING})`;
 if (matchMedia('(max-width: 700px)').matches) showPanel(false);
 try {

@@ -58,6 +58,20 @@ export class Overlays {
     this.set(name, drawn);
   }
 
+  // Draws colours (red, green, blue, alpha) on a horizontal rectangle, row by row from its lower corner.
+  image(name, low, size, edge, colours) {
+    if (colours.length === 0) return this.set(name, null);
+    const map = new THREE.DataTexture(colours, ...size);
+    map.colorSpace = THREE.SRGBColorSpace;
+    map.needsUpdate = true;
+    const material = new THREE.MeshBasicMaterial({ map, alphaTest: 0.5, side: THREE.DoubleSide });
+    material.addEventListener('dispose', () => map.dispose());
+    const [width, height] = size.map((count) => count * edge);
+    const drawn = new THREE.Mesh(new THREE.PlaneGeometry(width, height).translate(width / 2, height / 2, 0), material);
+    drawn.position.set(...low);
+    this.set(name, drawn);
+  }
+
   box(name, low, high, colour) {
     const size = high.map((k, axis) => k - low[axis]);
     const corner = (k) => [k & 1, k >> 1 & 1, k >> 2].map((on, axis) => on * size[axis]);

@@ -6,6 +6,8 @@ const STOPS = [[38, 13, 74], [57, 62, 138], [38, 104, 142], [31, 144, 138], [74,
 export const CHANGES = [[0, 114, 208], [230, 126, 0], [150, 154, 162]];
 // Points on moving objects, as in pictures of maps: no other colour is similar, also with colour blindness.
 export const MOVING = [190, 18, 24];
+// Obstacles among distances, as in pictures of maps.
+export const OBSTACLE = [226, 230, 236];
 export const LAYERS = [[0, 114, 178], [230, 159, 0], [0, 158, 115], [204, 121, 167], [86, 180, 233], [213, 94, 0]];
 
 export function colourAt(share) {

@@ -7,8 +7,8 @@ import { KIND } from './node.js';
 import { Overlays } from './overlays.js';
 
 const MOST_CALLS = 200;
-// Draw calls reserved for overlays: trajectory, sensor, moving points, marks, grid, bounding box.
-const OVERLAY_CALLS = 8;
+// Draw calls reserved for overlays: trajectory, sensor, moving points, distances, marks, grid, bounding box.
+const OVERLAY_CALLS = 9;
 
 // Scene with layers, overlays and camera. Draws only after changes.
 export class Viewer {
