@@ -40,7 +40,7 @@ def section(names, text):
 
 
 def main(target, features, *packages):
-    metadata = json.loads(cargo("metadata", "--locked", "--format-version", "1"))
+    metadata = json.loads(cargo("metadata", "--locked", "--all-features", "--format-version", "1"))
     known = {(package["name"], package["version"]): package for package in metadata["packages"]}
     # Compared by words: the same license occurs with different line breaks.
     named, without = {}, []
