@@ -6,13 +6,16 @@ use testkit::random_scans::{Random, random_scan};
 use testkit::reference_map::voxels_of;
 use testkit::unsynced_disk::UnsyncedDisk;
 use voxtile::integrity::{repair, verify};
-use voxtile::operations::{Decay, Part, Prefer, clear, convert, crop, decay, merge};
+use voxtile::operations::{
+    Decay, Part, Prefer, Replay, ScanSelection, clear, convert, crop, decay, merge, rebuild, remove_points,
+    remove_scans,
+};
 use voxtile::scan::{OFFSETS_PER_VOXEL, ScanRef};
 use voxtile::sensor::{Iwlo, SensorModel};
 use voxtile::tile::{ClassVotes, TimeSpan};
 use voxtile::{
     Aabb, Error, InMemoryMapper, InsertMode, Layers, MapConfig, MapPath, MapQueries, MapReader, MapView,
-    Mapper, OutOfCoreTileMapper, PointAttributes, Scan, ScanPoints, Storage, TileBox, VoxelIndex,
+    Mapper, OutOfCoreTileMapper, PointAttributes, Scan, ScanPoints, Stop, Storage, TileBox, VoxelIndex,
     VoxelLayers,
 };
 
@@ -348,4 +351,56 @@ fn maps_state_their_layers() {
     drop(build(at(&folder, "plain"), &config().with_layers(Layers::NONE), &scans));
     let text = std::fs::read_to_string(folder.path().join("plain/metadata.json")).unwrap();
     assert!(text.contains("\"version\": \"1.0\"") && !text.contains("layers"), "{text}");
+}
+
+#[test]
+fn layers_follow_kept_scans() {
+    let folder = tempfile::tempdir().unwrap();
+    let config = config().with_kept_scans(true);
+    let mut scans = scans(21, 6, 150);
+    scans.iter_mut().for_each(|scan| scan.scan.points.retain(|point| point.iter().all(|x| x.abs() < 1e3)));
+    for scan in &mut scans {
+        let points = scan.scan.points.len();
+        scan.scan.intensities.as_mut().unwrap().truncate(points);
+        scan.attributes.colours.truncate(points);
+        scan.attributes.classes.truncate(points);
+    }
+    drop(build(at(&folder, "map"), &config, &scans));
+    let open = |name: &str| MapReader::open(at(&folder, name), 0).unwrap();
+
+    // Rebuilt with other tiles.
+    let mut other = MapConfig::new(0.4, 6.4).unwrap().with_layers(all_layers());
+    other.rays = config.rays;
+    rebuild(&open("map"), folder.path().join("other"), other, |rays| *rays, &Stop::default(), |_, _| ())
+        .unwrap();
+    assert!(layers_of(&open("other")) == naive(&config, &scans));
+
+    let how = Replay::default().with_memory(voxtile::MemoryLimit::tiles(3));
+    let second = ScanSelection::Numbers(2, 2);
+    remove_scans(at(&folder, "map"), &second, false, &how, |_, _| ()).unwrap();
+    scans.remove(1);
+    assert!(layers_of(&open("map")) == naive(&config, &scans));
+
+    let region = Aabb { min: [0.0, -1.0, -5.0], max: [2.0, 3.0, 5.0] };
+    remove_points(at(&folder, "map"), &region, &how, |_, _| ()).unwrap();
+    for Attributed { scan, attributes, .. } in &mut scans {
+        let keeps: Vec<bool> = scan
+            .points
+            .iter()
+            .map(|point| !(0..3).all(|k| region.min[k] <= point[k] && point[k] < region.max[k]))
+            .collect();
+        let kept = |number: &mut usize| {
+            *number += 1;
+            keeps[*number - 1]
+        };
+        let mut numbers = [0; 4];
+        scan.points.retain(|_| kept(&mut numbers[0]));
+        scan.intensities.as_mut().unwrap().retain(|_| kept(&mut numbers[1]));
+        attributes.colours.retain(|_| kept(&mut numbers[2]));
+        attributes.classes.retain(|_| kept(&mut numbers[3]));
+    }
+    assert!(layers_of(&open("map")) == naive(&config, &scans));
+    let mut findings = Vec::new();
+    verify(at(&folder, "map"), |finding| findings.push(finding.clone()), |_, _| {}).unwrap();
+    assert!(findings.is_empty(), "{findings:?}");
 }

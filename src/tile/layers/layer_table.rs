@@ -56,21 +56,31 @@ impl LayerTable {
     pub fn add(&mut self, first: VoxelIndex, hits: &LayerHits) {
         let first = VoxelKey::from_index(first).0;
         let layers = self.layers;
-        let mut last = (None, 0);
+        // Neighboring points mostly hit the same brick.
+        let (mut last, mut number, mut bytes_before) = (None, 0, 0);
         for hit in hits.iter() {
             let offset = hit.voxel_offset();
             let key: [u16; 3] = std::array::from_fn(|k| first[k].wrapping_add(offset[k] as u16));
-            // Neighboring points mostly hit the same brick.
             let corner = key.map(|k| k / 8);
-            if last.0 != Some(corner) {
-                last = (Some(corner), self.number_of(VoxelKey(key).morton().brick()));
+            if last != Some(corner) {
+                if last.is_some() {
+                    self.note_grown(number, bytes_before);
+                }
+                last = Some(corner);
+                number = self.number_of(VoxelKey(key).morton().brick());
+                bytes_before = self.bricks[number].1.heap_bytes();
             }
-            let brick = &mut self.bricks[last.1].1;
-            let before = brick.heap_bytes();
-            brick.add(place_of_voxel(key.map(i32::from)), hit, hits.stamp_ns, &layers);
-            self.content_bytes += brick.heap_bytes();
-            self.content_bytes -= before;
+            let place = place_of_voxel(key.map(i32::from));
+            self.bricks[number].1.add(place, hit, hits.stamp_ns, &layers);
         }
+        if last.is_some() {
+            self.note_grown(number, bytes_before);
+        }
+    }
+
+    fn note_grown(&mut self, number: usize, bytes_before: usize) {
+        self.content_bytes += self.bricks[number].1.heap_bytes();
+        self.content_bytes -= bytes_before;
     }
 
     /// Replaces the layers of a voxel.

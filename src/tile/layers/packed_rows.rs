@@ -5,6 +5,8 @@ use super::row::{COLUMNS, Row};
 pub(super) struct PackedRows {
     /// Bits of each column.
     bits: [u8; COLUMNS],
+    /// Number of columns up to the last one with bits.
+    used: usize,
     /// Bytes of a row.
     stride: usize,
     /// The rows, and eight bytes after the last one, so that eight bytes can be read at each byte of a row.
@@ -29,7 +31,7 @@ impl PackedRows {
     pub(super) fn get(&self, number: usize) -> Row {
         let mut row = Row::default();
         let mut at = number * self.stride * 8;
-        for (column, &bits) in row.0.iter_mut().zip(&self.bits) {
+        for (column, &bits) in row.0.iter_mut().zip(&self.bits[..self.used]) {
             if bits > 0 {
                 *column = self.field(at, bits);
                 at += usize::from(bits);
@@ -61,8 +63,13 @@ impl PackedRows {
 
     #[inline]
     fn fits(&self, row: &Row) -> bool {
-        // A column of no bits holds zeros alone.
-        row.0.iter().zip(&self.bits).all(|(&value, &bits)| bits_of(value) <= bits)
+        let (used, others) = row.0.split_at(self.used);
+        // Without branches: nearly all rows fit.
+        let too_large = used.iter().zip(&self.bits).fold(0, |all, (&value, &bits)| {
+            let above = value >> (bits / 2) >> (bits - bits / 2);
+            all | above
+        });
+        others.iter().fold(too_large, |all, value| all | value) == 0
     }
 
     /// Widens the columns in which a value of this row does not fit.
@@ -83,9 +90,10 @@ impl PackedRows {
                 *bits = if *bits == 0 { needed } else { (needed + 1).min(64) };
             }
         }
+        let used = bits.iter().rposition(|bits| *bits > 0).map_or(0, |last| last + 1);
         let stride = bits.iter().map(|bits| usize::from(*bits)).sum::<usize>().div_ceil(8).max(1);
         let count = self.len();
-        let mut wider = Self { bits, stride, bytes: vec![0; count * stride + PADDING] };
+        let mut wider = Self { bits, used, stride, bytes: vec![0; count * stride + PADDING] };
         (0..count).for_each(|number| wider.write(number, &self.get(number)));
         *self = wider;
     }
@@ -93,10 +101,10 @@ impl PackedRows {
     #[inline]
     fn write(&mut self, number: usize, row: &Row) {
         let mut at = number * self.stride * 8;
-        for column in 0..COLUMNS {
+        for (column, value) in row.0.iter().enumerate().take(self.used) {
             let bits = self.bits[column];
             if bits > 0 {
-                self.set_field(at, bits, row.0[column]);
+                self.set_field(at, bits, *value);
                 at += usize::from(bits);
             }
         }

@@ -288,3 +288,80 @@ impl<'a> Votes<'a> {
         self.next.is_none() && self.bytes.is_empty()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scan::{LayerHit, LayerHits};
+    use crate::tile::format::CompactEffort;
+    use proptest::prelude::*;
+
+    const TILE: VoxelBox = VoxelBox { min: [-16, 0, 100], end: [16, 32, 132] };
+
+    fn all() -> Layers {
+        Layers { colour: true, intensity_max: Some(255.0), class: true, time: true, shape: true }
+    }
+
+    fn any_hits() -> impl Strategy<Value = Vec<(LayerHit, Option<i64>)>> {
+        let class = prop::option::of(prop::sample::select(vec![0, 2, 2, 2, 255]));
+        let offset = prop::array::uniform3(-512..512_i16);
+        let hit = (
+            0..3000_u32,
+            offset,
+            any::<Option<u16>>(),
+            any::<Option<[u8; 3]>>(),
+            class,
+            any::<Option<i64>>(),
+        );
+        let hit = hit.prop_map(|(place, offset, intensity, colour, class, stamp_ns)| {
+            let voxel = LayerHit::packed_voxel([place % 32, place / 32 % 9, place / 288].map(|k| k as i32));
+            (LayerHit { voxel, offset, intensity, colour, class }, stamp_ns)
+        });
+        prop::collection::vec(hit, 1..60)
+    }
+
+    fn table(hits: impl Iterator<Item = (LayerHit, Option<i64>)>) -> LayerTable {
+        let mut table = LayerTable::new(all());
+        for (hit, stamp_ns) in hits {
+            let mut of_scan = LayerHits::new(all(), stamp_ns);
+            of_scan.push(hit);
+            table.add(TILE.min, &of_scan);
+        }
+        table
+    }
+
+    fn section(table: &LayerTable) -> Vec<u8> {
+        layer_section(table, &mut ColumnWriter::new(CompactEffort::Fast).unwrap()).unwrap()
+    }
+
+    fn read(bytes: &[u8]) -> Result<LayerTable, DecodeError> {
+        read_layer_section(&mut { bytes }, bytes.len() as u64, &TILE)
+    }
+
+    proptest! {
+        #[test]
+        fn layers_round_trip_and_equal_layers_have_equal_bytes(hits in any_hits()) {
+            let (ahead, back) = (table(hits.iter().copied()), table(hits.iter().rev().copied()));
+            let bytes = section(&ahead);
+            prop_assert!(ahead.is_same(&back) && bytes == section(&back));
+            let read = read(&bytes).unwrap();
+            prop_assert!(read.is_same(&ahead));
+            prop_assert_eq!(section(&read), bytes);
+        }
+
+        #[test]
+        fn damaged_sections_are_errors_or_layers(hits in any_hits(), at in any::<prop::sample::Index>(), bit in 0..8) {
+            let mut bytes = section(&table(hits.into_iter()));
+            let at = at.index(bytes.len());
+            bytes[at] ^= 1_u8 << bit;
+            prop_assert!(read(&bytes).is_err());
+            prop_assert!(read(&bytes[..at]).is_err());
+            // With a checksum that matches, what is read can be written.
+            let crc = crc32fast::hash(&bytes[HEADER_BYTES..]);
+            bytes[16..20].copy_from_slice(&crc.to_le_bytes());
+            if let Ok(table) = read(&bytes) {
+                prop_assert!(read(&section(&table)).unwrap().is_same(&table));
+            }
+        }
+    }
+}
