@@ -30,6 +30,7 @@ pub(crate) mod guard;
 mod input_file;
 pub(crate) mod inside;
 mod intrinsics;
+mod label_file;
 #[cfg(feature = "las")]
 pub(crate) mod las;
 #[cfg(feature = "las")]

@@ -1,0 +1,234 @@
+use crate::support::rows_of;
+use std::fs;
+use std::path::{Path, PathBuf};
+use voxtile::scan::{AttributeSet, PointFrame, ScanPoints};
+use voxtile_formats::{ClassSelection, PointBudget, ReadOptions, Returns, Selection, open_scans};
+
+/// A point with its attributes.
+pub type Row = ([f64; 3], Option<[u8; 3]>, Option<u8>);
+
+pub const BOTH: AttributeSet = AttributeSet { colours: true, classes: true };
+
+/// More points than are in memory or in a chunk of the file.
+const ROWS: usize = 40_000;
+
+pub fn options(attributes: AttributeSet) -> ReadOptions {
+    ReadOptions { attributes, poses: Some("identity".into()), ..ReadOptions::default() }
+}
+
+/// Returns the points of all scans, and the remarks at the end.
+pub fn scanned(
+    path: &Path,
+    options: &ReadOptions,
+    max_bytes: usize,
+) -> Result<(Vec<Row>, Vec<String>), String> {
+    let scratch = tempfile::tempdir().unwrap();
+    let budget = PointBudget::new(max_bytes, scratch.path());
+    let mut source = open_scans(path, options).map_err(|error| format!("{error:#}"))?;
+    let mut rows = Vec::new();
+    while let Some(scan) = source.next_stored(&budget).map_err(|error| format!("{error:#}"))? {
+        let set = scan.attributes();
+        scan.for_each_attributed_chunk(0..scan.len(), PointFrame::World, &mut |points, _, attributes| {
+            assert_eq!(attributes.colours.len(), if set.colours { points.len() } else { 0 });
+            assert_eq!(attributes.classes.len(), if set.classes { points.len() } else { 0 });
+            let row = |(at, point): (usize, &[f64; 3])| (*point, attributes.colour(at), attributes.class(at));
+            rows.extend(points.iter().enumerate().map(row));
+            true
+        })
+        .unwrap();
+    }
+    Ok((rows, source.remarks()))
+}
+
+/// Checks that a file gives these points with any budget, and those of other requests.
+fn assert_rows(path: &Path, wanted: &[Row]) {
+    for max_bytes in [0, usize::MAX] {
+        let (found, remarks) = scanned(path, &options(BOTH), max_bytes).unwrap();
+        assert!(found == wanted, "{}: {max_bytes}", path.display());
+        assert_eq!(remarks, [""; 0], "{}", path.display());
+    }
+    let colours = AttributeSet { colours: true, ..AttributeSet::NONE };
+    let only: Vec<Row> = wanted.iter().map(|(point, colour, _)| (*point, *colour, None)).collect();
+    assert!(scanned(path, &options(colours), 0).unwrap().0 == only);
+    let none: Vec<Row> = wanted.iter().map(|(point, ..)| (*point, None, None)).collect();
+    assert!(scanned(path, &options(AttributeSet::NONE), 0).unwrap().0 == none);
+    // Selection by class needs no layer.
+    for (only_class, skip_class) in [(vec![1, 2, 3], vec![]), (vec![], vec![0, 7, 18]), (vec![5, 7], vec![7])]
+    {
+        let classes = ClassSelection { only_class, skip_class };
+        let selected: Vec<Row> = wanted.iter().filter(|row| classes.takes(row.2)).copied().collect();
+        assert!(!selected.is_empty() && selected.len() < wanted.len());
+        let selecting = ReadOptions { classes: classes.clone(), ..options(BOTH) };
+        let (found, remarks) = scanned(path, &selecting, 0).unwrap();
+        assert!(found == selected, "{classes:?}");
+        let left_out = wanted.len() - selected.len();
+        assert_eq!(remarks, [format!("{left_out} points were left out by their class")]);
+        let found = scanned(path, &ReadOptions { attributes: AttributeSet::NONE, ..selecting }, 0).unwrap().0;
+        assert!(found.iter().zip(&selected).all(|(a, b)| a.0 == b.0 && (a.1, a.2) == (None, None)));
+    }
+    // Ignored points.
+    let mut selection = Selection::default();
+    selection.ignored = Some(voxtile::space::Aabb { min: [-1e9; 3], max: [0.0, 1e9, 1e9] });
+    let kept: Vec<Row> = wanted.iter().filter(|(point, ..)| point[0] > 0.0).copied().collect();
+    let found = scanned(path, &ReadOptions { selection, ..options(BOTH) }, 0).unwrap().0;
+    assert!(!kept.is_empty() && found == kept);
+}
+
+fn write(folder: &Path, name: &str, parts: &[&[u8]]) -> PathBuf {
+    let path = folder.join(name);
+    fs::write(&path, parts.concat()).unwrap();
+    path
+}
+
+fn floats(point: [f64; 3]) -> Vec<u8> {
+    point.iter().flat_map(|axis| (*axis as f32).to_le_bytes()).collect()
+}
+
+fn bits_of(colour: Option<[u8; 3]>, alpha: u8) -> u32 {
+    let [red, green, blue] = colour.unwrap_or_default();
+    u32::from_be_bytes([alpha, red, green, blue])
+}
+
+/// Compresses by literal runs only.
+fn lzf(bytes: &[u8]) -> Vec<u8> {
+    bytes.chunks(32).flat_map(|run| [&[run.len() as u8 - 1][..], run].concat()).collect()
+}
+
+#[test]
+fn pcd_files_give_colours_and_classes() {
+    let folder = tempfile::tempdir().unwrap();
+    let rows = rows_of(ROWS);
+    let head = |kind: &str, name: &str, data: &str| {
+        format!(
+            "VERSION 0.7\nFIELDS x y z {name} label\nSIZE 4 4 4 4 2\nTYPE F F F {kind} U\nCOUNT 1 1 1 1 1\n\
+             WIDTH {ROWS}\nHEIGHT 1\nPOINTS {ROWS}\nDATA {data}\n"
+        )
+    };
+    let class = |row: &Row| u16::from(row.2.unwrap());
+    // With an alpha of 255, the bits of many colours are a float of NaN.
+    for (kind, name, alpha) in [("F", "rgb", 0), ("F", "rgb", 255), ("U", "rgba", 255), ("I", "rgb", 7)] {
+        let bits = |row: &Row| bits_of(row.1, alpha);
+        let record = |row: &Row| {
+            [floats(row.0), bits(row).to_le_bytes().to_vec(), class(row).to_le_bytes().to_vec()].concat()
+        };
+        let binary: Vec<u8> = rows.iter().flat_map(record).collect();
+        assert_rows(&write(folder.path(), "b.pcd", &[head(kind, name, "binary").as_bytes(), &binary]), &rows);
+        let mut columns: Vec<u8> = Vec::new();
+        for axis in 0..3 {
+            columns.extend(rows.iter().flat_map(|row| (row.0[axis] as f32).to_le_bytes()));
+        }
+        columns.extend(rows.iter().flat_map(|row| bits(row).to_le_bytes()));
+        columns.extend(rows.iter().flat_map(|row| class(row).to_le_bytes()));
+        let packed = lzf(&columns);
+        let sizes = [(packed.len() as u32).to_le_bytes(), (columns.len() as u32).to_le_bytes()].concat();
+        let start = head(kind, name, "binary_compressed");
+        assert_rows(&write(folder.path(), "c.pcd", &[start.as_bytes(), &sizes, &packed]), &rows);
+        let text: String = rows
+            .iter()
+            .map(|row| {
+                let ([x, y, z], bits, class) = (row.0, bits(row), class(row));
+                // As a float, or as PCL writes it: as an integer.
+                match (kind, alpha) {
+                    ("F", 0) => format!("{x} {y} {z} {:e} {class}\n", f32::from_bits(bits)),
+                    _ => format!("{x} {y} {z} {bits} {class}\n"),
+                }
+            })
+            .collect();
+        let start = head(kind, name, "ascii");
+        assert_rows(&write(folder.path(), "a.pcd", &[start.as_bytes(), text.as_bytes()]), &rows);
+    }
+}
+
+#[test]
+fn ply_files_give_colours_and_classes() {
+    let folder = tempfile::tempdir().unwrap();
+    let rows = rows_of(ROWS);
+    let head = |format: &str, kind: &str, names: [&str; 3], class: &str| {
+        let [red, green, blue] = names.map(|name| format!("property {kind} {name}\n"));
+        format!(
+            "ply\nformat {format} 1.0\nelement vertex {ROWS}\nproperty float x\nproperty float y\n\
+             property float z\n{red}{green}{blue}property uchar {class}\nend_header\n"
+        )
+    };
+    for (kind, names, class) in [
+        ("uchar", ["red", "green", "blue"], "label"),
+        ("uint", ["r", "g", "b"], "class"),
+        ("ushort", ["diffuse_red", "diffuse_green", "diffuse_blue"], "scalar_Classification"),
+        ("float", ["Red", "Green", "Blue"], "classification"),
+    ] {
+        let value = |channel: u8| match kind {
+            "ushort" => format!("{}", u16::from(channel) * 256 + 200),
+            "float" => format!("{}", f32::from(channel) / 255.0),
+            _ => format!("{channel}"),
+        };
+        let bytes = |channel: u8| match kind {
+            "uchar" => vec![channel],
+            "uint" => u32::from(channel).to_le_bytes().to_vec(),
+            "ushort" => (u16::from(channel) * 256 + 200).to_le_bytes().to_vec(),
+            _ => (f32::from(channel) / 255.0).to_le_bytes().to_vec(),
+        };
+        let (mut binary, mut text) = (Vec::new(), String::new());
+        for (point, colour, label) in &rows {
+            let (colour, label, [x, y, z]) = (colour.unwrap(), label.unwrap(), *point);
+            binary.extend(floats(*point));
+            binary.extend(colour.iter().flat_map(|channel| bytes(*channel)));
+            binary.push(label);
+            text += &format!("{x} {y} {z} {} {label}\n", colour.map(value).join(" "));
+        }
+        let files = [
+            write(
+                folder.path(),
+                "b.ply",
+                &[head("binary_little_endian", kind, names, class).as_bytes(), &binary],
+            ),
+            write(folder.path(), "a.ply", &[head("ascii", kind, names, class).as_bytes(), text.as_bytes()]),
+        ];
+        for path in files {
+            if kind != "float" {
+                assert_rows(&path, &rows);
+                continue;
+            }
+            let (found, remarks) = scanned(&path, &options(BOTH), 0).unwrap();
+            assert!(found == rows && remarks.len() == 1 && remarks[0].contains("from 0 to 1"), "{remarks:?}");
+        }
+    }
+}
+
+#[test]
+fn numbers_that_are_no_class_are_counted() {
+    let folder = tempfile::tempdir().unwrap();
+    let head = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n\
+                property int label\nend_header\n1 2 3 255\n1 2 3 256\n1 2 3 -1\n";
+    let path = write(folder.path(), "a.ply", &[head.as_bytes()]);
+    let (rows, remarks) = scanned(&path, &options(BOTH), 0).unwrap();
+    assert_eq!(rows.iter().map(|row| row.2).collect::<Vec<_>>(), [Some(255), None, None]);
+    assert!(remarks.len() == 1 && remarks[0].starts_with("2 points have a class number"), "{remarks:?}");
+    assert!(remarks[0].contains("such as 256"), "{remarks:?}");
+    // A point without a class is none of the wanted classes, and none of those to skip.
+    let classes = ClassSelection { only_class: vec![255], ..ClassSelection::default() };
+    assert_eq!(scanned(&path, &ReadOptions { classes, ..options(BOTH) }, 0).unwrap().0.len(), 1);
+    let classes = ClassSelection { skip_class: vec![255], ..ClassSelection::default() };
+    assert_eq!(scanned(&path, &ReadOptions { classes, ..options(BOTH) }, 0).unwrap().0.len(), 2);
+}
+
+#[test]
+fn selections_without_effect_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let ply = "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float z\n\
+               end_header\n1 2 3\n";
+    let pcd = "VERSION 0.7\nFIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nPOINTS 1\nDATA ascii\n1 2 3\n";
+    let classes = ClassSelection { only_class: vec![2], ..ClassSelection::default() };
+    for (name, text) in [("a.ply", ply), ("a.pcd", pcd), ("a.log", "NODE 0 0 0 0 0 0\n1 2 3\n")] {
+        let path = write(folder.path(), name, &[text.as_bytes()]);
+        let mut given = ReadOptions { classes: classes.clone(), ..options(AttributeSet::NONE) };
+        given.poses = given.poses.filter(|_| name != "a.log");
+        let error = scanned(&path, &given, 0).unwrap_err();
+        assert!(
+            error.starts_with("only_class, skip_class: ") && error.contains("have no classes"),
+            "{error}"
+        );
+        let given = ReadOptions { returns: Returns::Last, classes: ClassSelection::default(), ..given };
+        let error = scanned(&path, &given, 0).unwrap_err();
+        assert!(error.starts_with("returns: ") && error.contains(name), "{error}");
+    }
+}
