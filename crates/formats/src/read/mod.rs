@@ -7,6 +7,8 @@ pub(crate) mod attribute_columns;
 pub(crate) mod bin;
 mod bin_columns;
 pub(crate) mod cloud;
+mod colour_image;
+mod colour_list;
 mod columns;
 pub(crate) mod companions;
 pub(crate) mod crs_unit;
