@@ -62,7 +62,8 @@ impl Registry {
                 let reason = format!("a {} has its own poses; omit the option", format.title);
                 return Err(Error::argument("poses", reason));
             }
-            Open::Scans(_) if format.name != "pcd" && !options.classes.is_everything() => {
+            // PCD and scan streams may have classes.
+            Open::Scans(_) if !matches!(format.name, "pcd" | "scans") && !options.classes.is_everything() => {
                 return Err(without_classes(&format!("{} ({})", path.display(), format.title)));
             }
             Open::Scans(open) => open(&path, options)?,

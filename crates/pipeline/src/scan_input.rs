@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 use voxtile::scan::Stop;
 use voxtile::{Error, Result};
 use voxtile_formats::{
-    ReadOptions, Registry, ScanSource, divide_inputs, open_scan_files, open_scans, read_scan_stream,
+    ReadOptions, Registry, ScanSource, divide_inputs, open_scan_files, open_scans, read_scan_stream_with,
 };
 
 /// Maximum length of an input name stored in a map, in characters.
@@ -102,7 +102,7 @@ impl ScanInput {
             return Err(Error::argument("poses", "a scan stream has its own poses; omit the option"));
         }
         let input = BufReader::with_capacity(1 << 18, stdin());
-        let stream = read_scan_stream(input, Path::new("standard input"), false)?;
+        let stream = read_scan_stream_with(input, Path::new("standard input"), false, options)?;
         Ok(options.selection.clone().of(Box::new(stream)))
     }
 }

@@ -98,4 +98,4 @@ pub use pcd::read_pcd;
 pub use points::read_points;
 pub use scan_graph::read_scan_graph;
 pub use scan_log::read_scan_log;
-pub use scan_stream::read_scan_stream;
+pub use scan_stream::{read_scan_stream, read_scan_stream_with};

@@ -1,8 +1,10 @@
 use crate::support::rows_of;
 use std::fs;
 use std::path::{Path, PathBuf};
-use voxtile::scan::{AttributeSet, PointFrame, ScanPoints};
-use voxtile_formats::{ClassSelection, PointBudget, ReadOptions, Returns, Selection, open_scans};
+use voxtile::scan::{AttributeSet, PointAttributes, PointFrame, ScanPoints};
+use voxtile_formats::{
+    ClassSelection, PointBudget, ReadOptions, Returns, ScanStreamWriter, Selection, SensorScan, open_scans,
+};
 
 /// A point with its attributes.
 pub type Row = ([f64; 3], Option<[u8; 3]>, Option<u8>);
@@ -304,6 +306,63 @@ fn e57_colours_are_scaled_by_their_limits() {
         assert_eq!(remarks.len(), 1, "{remarks:?}");
         let found = scanned(&path, &ReadOptions { attributes: AttributeSet::NONE, ..reading }, 0).unwrap().0;
         assert!(found.iter().all(|row| row.1.is_none()) && found.len() == ROWS);
+    }
+}
+
+#[test]
+fn scan_streams_carry_attributes() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut rows = rows_of(ROWS);
+    for (k, row) in rows.iter_mut().enumerate() {
+        row.1 = row.1.filter(|_| k % 3 > 0);
+        row.2 = row.2.filter(|_| k % 4 > 0);
+    }
+    let pose = voxtile::Pose::identity();
+    let scan = SensorScan {
+        name: String::new(),
+        points_in_sensor: rows.iter().map(|row| row.0).collect(),
+        intensities: None,
+        attributes: PointAttributes {
+            colours: rows.iter().map(|row| row.1).collect(),
+            classes: rows.iter().map(|row| row.2).collect(),
+        },
+        world_from_sensor: pose,
+    };
+    for has_intensities in [false, true] {
+        let intensities = has_intensities.then(|| vec![0.25; ROWS]);
+        let scan = SensorScan { intensities, ..scan.clone() };
+        for (colours, classes) in [(true, true), (true, false), (false, true)] {
+            let set = AttributeSet { colours, classes };
+            let mut bytes = Vec::new();
+            let mut writer =
+                ScanStreamWriter::with_attributes(&mut bytes, "a", has_intensities, set).unwrap();
+            writer.write(&scan).unwrap();
+            // A scan without attributes.
+            writer.write(&SensorScan { attributes: PointAttributes::default(), ..scan.clone() }).unwrap();
+            let path = write(folder.path(), "a.scans", &[&bytes]);
+            let wanted: Vec<Row> = (rows.iter())
+                .map(|row| (row.0, row.1.filter(|_| colours), row.2.filter(|_| classes)))
+                .chain(rows.iter().map(|row| (row.0, None, None)))
+                .collect();
+            let reading = ReadOptions { poses: None, ..options(BOTH) };
+            assert!(scanned(&path, &reading, 0).unwrap().0 == wanted);
+            let none = ReadOptions { attributes: AttributeSet::NONE, ..reading.clone() };
+            assert!(scanned(&path, &none, 0).unwrap().0.iter().all(|row| (row.1, row.2) == (None, None)));
+            let skip_class = ClassSelection { skip_class: vec![7], ..ClassSelection::default() };
+            let skipping = ReadOptions { classes: skip_class, ..none };
+            let found = scanned(&path, &skipping, 0);
+            if classes {
+                let left = wanted.iter().filter(|row| row.2 != Some(7)).count();
+                let (found, remarks) = found.unwrap();
+                assert_eq!((found.len(), remarks.len()), (left, 1));
+            } else {
+                assert!(found.unwrap_err().contains("a.scans have no classes"));
+            }
+            let cut = bytes.len() - 1;
+            let error =
+                scanned(&write(folder.path(), "cut.scans", &[&bytes[..cut]]), &reading, 0).unwrap_err();
+            assert!(error.contains("the stream ends in the attributes of a point"), "{error}");
+        }
     }
 }
 

@@ -188,7 +188,10 @@ fn with_colours() -> ReadOptions {
     }
 }
 
-fn colours_of(folder: &Path, options: &ReadOptions) -> (Vec<Vec<Option<[u8; 3]>>>, Vec<String>) {
+/// Colours of the points of an image.
+type Colours = Vec<Option<[u8; 3]>>;
+
+fn colours_of(folder: &Path, options: &ReadOptions) -> (Vec<Colours>, Vec<String>) {
     let mut source = voxtile_formats::open_clouds(folder, options).unwrap();
     let clouds = crate::support::all(source.as_mut()).unwrap();
     let of = |(head, points): &crate::support::Cloud| {
