@@ -142,6 +142,7 @@ impl AttributeValues {
     }
 
     /// Continues with columns of other types, for instance of the next message. A scale derived from a colour is kept.
+    #[cfg(feature = "ros")]
     pub(crate) fn continue_with(&mut self, colours: Option<[Scalar; 3]>) {
         let scale = Self::new(colours).scale;
         if scale.is_some() {

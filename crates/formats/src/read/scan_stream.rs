@@ -1,6 +1,6 @@
-use super::of_classes::{left_out_remark, without_classes};
+use super::of_classes::{left_out_remark, without_classes, without_returns};
 use super::stream_input::{AnyInput, FileInput, StreamInput};
-use crate::class_selection::ClassSelection;
+use crate::class_selection::{ClassSelection, Returns};
 use crate::read_options::ReadOptions;
 use crate::scans::Fingerprint;
 use crate::scans::PointStore;
@@ -69,6 +69,9 @@ fn begin<R: StreamInput>(
         chunk: Vec::new(),
     };
     stream.read_header()?;
+    if options.returns != Returns::All {
+        return Err(without_returns(&format!("{}, a scan stream", path.display())));
+    }
     if !(stream.classes.is_everything() || stream.attributes.classes) {
         return Err(without_classes(&path.display().to_string()));
     }
