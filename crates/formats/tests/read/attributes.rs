@@ -309,6 +309,38 @@ fn e57_colours_are_scaled_by_their_limits() {
     }
 }
 
+/// With poses, motion compensation and points without a return.
+#[test]
+fn attributes_remain_with_their_points() {
+    let folder = tempfile::tempdir().unwrap();
+    let rows = rows_of(100);
+    let mut ply = "ply\nformat ascii 1.0\nelement vertex 100\nproperty float x\nproperty float y\n\
+                   property float z\nproperty double t\nproperty uchar red\nproperty uchar green\n\
+                   property uchar blue\nproperty uchar label\nend_header\n"
+        .to_owned();
+    for (k, ([x, y, z], colour, class)) in rows.iter().enumerate() {
+        let ([red, green, blue], class) = (colour.unwrap(), class.unwrap());
+        let x = if k % 7 == 0 { "nan".to_owned() } else { x.to_string() };
+        ply += &format!("{x} {y} {z} {} {red} {green} {blue} {class}\n", 0.001 * k as f64);
+    }
+    write(folder.path(), "1700000000.0.ply", &[ply.as_bytes()]);
+    let poses = "1699999999.9 0 0 0 0 0 0 1\n1700000000.2 30 0 0 0 0 1 0\n";
+    let poses = Some(write(folder.path(), "poses.txt", &[poses.as_bytes()]));
+    for (is_deskewed, is_world_frame, has_no_returns) in
+        [(true, false, true), (true, false, false), (false, true, true), (false, false, false)]
+    {
+        let mut given = ReadOptions { poses: poses.clone(), ..options(BOTH) };
+        given.clouds.is_deskewed = is_deskewed;
+        given.clouds.is_world_frame = is_world_frame;
+        given.clouds.has_no_returns = has_no_returns;
+        let (found, remarks) = scanned(folder.path(), &given, 0).unwrap();
+        assert!(
+            found.iter().map(|row| (row.1, row.2)).eq(rows.iter().map(|row| (row.1, row.2))),
+            "{remarks:?}"
+        );
+    }
+}
+
 #[test]
 fn scan_streams_carry_attributes() {
     let folder = tempfile::tempdir().unwrap();

@@ -60,6 +60,28 @@ fn las_files_give_colours_and_classes() {
     }
 }
 
+/// Points are sorted by time, in memory or in a file. Their attributes move with them.
+#[test]
+fn order_of_records_does_not_matter() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.las");
+    for (format, of_point) in [(3, colour as fn(usize) -> [u16; 3]), (7, bytes)] {
+        let las = Las { colour: of_point, ..las(format) };
+        let mut records: Vec<Vec<u8>> = (0..POINTS).map(|k| las.point(k)).collect();
+        for k in (1..POINTS).rev() {
+            records.swap(k, k.wrapping_mul(2_654_435_761) % (k + 1));
+        }
+        fs::write(&path, [las.head(false), records.concat()].concat()).unwrap();
+        let low = |colour: [u16; 3]| Some(colour.map(|value| value as u8));
+        let high = |colour: [u16; 3]| Some(colour.map(|value| (value >> 8) as u8));
+        let rows = if format == 3 { wanted(&las, high) } else { wanted(&las, low) };
+        for memory_bytes in [1 << 12, 1 << 16, 1 << 28] {
+            let reading = ReadOptions { memory_bytes, scan_period_s: 0.9, ..options(BOTH) };
+            assert!(scanned(&path, &reading, 0).unwrap().0 == rows, "{format} {memory_bytes}");
+        }
+    }
+}
+
 #[test]
 fn scale_of_colours_is_that_of_the_file() {
     let folder = tempfile::tempdir().unwrap();
