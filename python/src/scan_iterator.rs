@@ -14,7 +14,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use voxtile::mapper::{KeptScan, KeptScans, MapReader};
-use voxtile::scan::{MovingMarks, ScanPoints};
+use voxtile::scan::{MovingMarks, PointAttributes, ScanPoints};
 use voxtile::{Pose, Result as Fallible, Stop};
 use voxtile_formats::{ReadOptions, ScanReach, ScanSource, SensorScan};
 use voxtile_pipeline::Watch;
@@ -83,7 +83,8 @@ fn in_memory(scan: &KeptScan) -> Fallible<SensorScan> {
         Some(pose) => pose,
         None => Pose::from_quaternion(origin, [0.0, 0.0, 0.0, 1.0])?,
     };
-    Ok(SensorScan { name: scan.number().to_string(), points_in_sensor, intensities, world_from_sensor })
+    let (name, attributes) = (scan.number().to_string(), PointAttributes::default());
+    Ok(SensorScan { name, points_in_sensor, intensities, attributes, world_from_sensor })
 }
 
 #[pymethods]

@@ -36,7 +36,7 @@ pub use open_files::{DividedInputs, divide_inputs, open_scan_files};
 pub use poses::{CloudOptions, Deskew, PoseSource, RigidPose};
 pub use read::{
     CloudHead, CloudPoint, CloudSource, PoseAt, read_pcd, read_points, read_scan_graph, read_scan_log,
-    read_scan_stream, stamp_of_name,
+    read_scan_stream, read_scan_stream_with, stamp_of_name,
 };
 pub use read_options::{ReadOptions, RecordingOptions};
 pub use registry::Registry;

@@ -9,7 +9,7 @@ use crate::read::files::Files;
 use crate::read::from_origin::FromOrigin;
 use crate::read::listing::Listing;
 use crate::read::name_stamps::NameStamps;
-use crate::read::of_classes::{OfClasses, without_classes};
+use crate::read::of_classes::{OfClasses, without_classes, without_returns};
 use crate::read::one::OneCloud;
 use crate::read::open_input;
 use crate::read::regular::check_regular;
@@ -62,7 +62,8 @@ impl Registry {
                 let reason = format!("a {} has its own poses; omit the option", format.title);
                 return Err(Error::argument("poses", reason));
             }
-            Open::Scans(_) if format.name != "pcd" && !options.classes.is_everything() => {
+            // PCD and scan streams may have classes.
+            Open::Scans(_) if !matches!(format.name, "pcd" | "scans") && !options.classes.is_everything() => {
                 return Err(without_classes(&format!("{} ({})", path.display(), format.title)));
             }
             Open::Scans(open) => open(&path, options)?,
@@ -121,12 +122,7 @@ pub(crate) fn check_returns(path: &Path, format: &InputFormat, options: &ReadOpt
     if options.returns == Returns::All || matches!(format.name, "las" | "laz" | "copc") {
         return Ok(());
     }
-    let reason = format!(
-        "{} is {}, which does not number the returns of a pulse as LAS files do: omit the option for this input",
-        path.display(),
-        format.title
-    );
-    Err(Error::argument("returns", reason))
+    Err(without_returns(&format!("{}, {}", path.display(), format.title)))
 }
 
 pub(crate) fn check(options: &ReadOptions) -> Result<()> {

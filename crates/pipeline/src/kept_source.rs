@@ -4,7 +4,7 @@ use crate::place::{is_map_at, url_of};
 use rustc_hash::FxHashMap;
 use std::path::{Path, PathBuf};
 use voxtile::mapper::KeptScans;
-use voxtile::scan::{Pose, ScanPoints, Stop};
+use voxtile::scan::{PointFrame, Pose, ScanPoints, Stop};
 use voxtile::{Error, Result};
 use voxtile_formats::{PointStore, ScanHead, ScanSource};
 
@@ -74,11 +74,12 @@ impl ScanSource for KeptSource {
             return Err(Error::argument(self.path.display().to_string(), reason));
         };
         let world_from_sensor = self.new_poses.get(&scan.number()).copied().unwrap_or(own);
-        points.begin(scan.has_intensities());
-        let mut pushed = Ok(());
-        scan.for_each_own_chunk(0..scan.len(), &mut |some, intensities| {
+        points.begin_with(scan.has_intensities(), scan.attributes());
+        let (mut pushed, all) = (Ok(()), 0..scan.len());
+        scan.for_each_attributed_chunk(all, PointFrame::Own, &mut |some, intensities, attributes| {
             pushed = some.iter().enumerate().try_for_each(|(at, &point)| {
-                points.push(point, intensities.map_or(0.0, |intensities| intensities[at]))
+                let intensity = intensities.map_or(0.0, |intensities| intensities[at]);
+                points.push_with(point, intensity, attributes.colour(at), attributes.class(at))
             });
             pushed.is_ok()
         })?;

@@ -11,7 +11,8 @@ use std::path::{Path, PathBuf};
 use voxtile::scan::Stop;
 use voxtile::{Error, Result};
 use voxtile_formats::{
-    ReadOptions, Registry, ScanSource, divide_inputs, open_scan_files, open_scans, read_scan_stream,
+    ReadOptions, Registry, Returns, ScanSource, divide_inputs, open_scan_files, open_scans,
+    read_scan_stream_with,
 };
 
 /// Maximum length of an input name stored in a map, in characters.
@@ -89,6 +90,11 @@ impl ScanInput {
             return open_scan_files(&paths, options);
         };
         if options.format.is_none() && is_map(scans, watch.stop())? {
+            if !options.classes.is_everything() || options.returns != Returns::All {
+                let reason =
+                    format!("{} is a map; its kept scans have no classes and returns", scans.display());
+                return Err(Error::argument("only_class, skip_class, returns", reason));
+            }
             let source = KeptSource::open(scans, PoseFile::of_reading(options).as_ref())?;
             return Ok(options.selection.clone().of(Box::new(source)));
         }
@@ -102,7 +108,7 @@ impl ScanInput {
             return Err(Error::argument("poses", "a scan stream has its own poses; omit the option"));
         }
         let input = BufReader::with_capacity(1 << 18, stdin());
-        let stream = read_scan_stream(input, Path::new("standard input"), false)?;
+        let stream = read_scan_stream_with(input, Path::new("standard input"), false, options)?;
         Ok(options.selection.clone().of(Box::new(stream)))
     }
 }

@@ -70,11 +70,15 @@ impl AttributeColumns {
 
     /// Returns a converter for values of these columns.
     pub(crate) fn values(&self, kind: impl Fn(usize) -> Option<Scalar>) -> AttributeValues {
-        let kinds = match self.colour {
-            Some(ColourColumns::Each([red, green, blue])) => kind(red).zip(kind(green)).zip(kind(blue)),
+        AttributeValues::new(self.colour_kinds(kind))
+    }
+
+    /// Returns the types of the columns of red, green and blue.
+    pub(crate) fn colour_kinds(&self, kind: impl Fn(usize) -> Option<Scalar>) -> Option<[Scalar; 3]> {
+        match self.colour {
+            Some(ColourColumns::Each([red, green, blue])) => Some([kind(red)?, kind(green)?, kind(blue)?]),
             _ => None,
-        };
-        AttributeValues::new(kinds.map(|((red, green), blue)| [red, green, blue]))
+        }
     }
 
     /// Returns whether a column is read.
@@ -135,6 +139,17 @@ impl AttributeValues {
             }
         });
         Self { scale, ..Self::default() }
+    }
+
+    /// Continues with columns of other types, for instance of the next message. A scale derived from a colour is kept.
+    #[cfg(feature = "ros")]
+    pub(crate) fn continue_with(&mut self, colours: Option<[Scalar; 3]>) {
+        let scale = Self::new(colours).scale;
+        if scale.is_some() {
+            (self.scale, self.is_guessed) = (scale, false);
+        } else if !self.is_guessed {
+            self.scale = None;
+        }
     }
 
     /// Returns the colour with these values of red, green and blue.

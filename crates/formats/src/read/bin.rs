@@ -1,7 +1,9 @@
+use super::attribute_columns::{AttributeColumns, AttributeValues};
 use super::bin_columns::{BinStart, Reading, Verdict};
 use super::cloud::CloudHead;
 use super::columns::{Clock, Meaning};
 use super::input_file::open_input;
+use super::label_file::LabelFile;
 use super::one::{Points, Visit};
 use super::scalar::Scalar;
 use crate::read_options::ReadOptions;
@@ -25,6 +27,11 @@ struct BinPoints {
     input: BufReader<File>,
     meaning: Meaning,
     clock: Clock,
+    attributes: AttributeColumns,
+    /// Converts values to attributes.
+    values: AttributeValues,
+    /// Classes of the points in a file of their own.
+    labels: Option<LabelFile>,
     columns: Columns,
     record: Vec<u8>,
     points: u64,
@@ -114,11 +121,22 @@ pub(crate) fn open(
     head.fields = columns.names.clone();
     head.has_intensities = meaning.intensity.is_some();
     head.has_times = meaning.time.is_some();
+    let wanted = options.attributes_to_read();
+    let attributes = AttributeColumns::of(columns.names.iter().map(String::as_str), wanted, |_| false);
+    let labels = match wanted.classes && attributes.class.is_none() {
+        true => LabelFile::beside(path, bytes / point_bytes)?,
+        false => None,
+    };
+    head.attributes = attributes.set();
+    head.attributes.classes |= labels.is_some();
     let points = BinPoints {
         path: path.to_owned(),
         input: BufReader::with_capacity(1 << 16, file),
         meaning,
         clock: Clock::new(head.stamp_ns),
+        attributes,
+        values: attributes.values(|at| columns.places.get(at).map(|(_, kind)| *kind)),
+        labels,
         record: vec![0; columns.point_bytes],
         columns,
         points: bytes / point_bytes,
@@ -227,12 +245,17 @@ impl Points for BinPoints {
                 let (place, kind) = places.get(at).copied().unwrap_or((usize::MAX, Scalar::F32));
                 record.get(place..).map_or(f64::NAN, |bytes| kind.value(bytes, false))
             };
-            visit(self.clock.point(&self.meaning, value))?;
+            let mut point = self.clock.point(&self.meaning, value);
+            self.attributes.set_in(&mut point, &mut self.values, value, |_| None);
+            if let Some(labels) = &mut self.labels {
+                point.class = self.values.class(f64::from(labels.next()?));
+            }
+            visit(point)?;
         }
         Ok(())
     }
 
     fn remarks(&self) -> Vec<String> {
-        self.remarks.clone()
+        self.remarks.iter().cloned().chain(self.values.remarks()).collect()
     }
 }

@@ -50,7 +50,7 @@ pub(crate) fn open(folder: &Path, options: &ReadOptions) -> Result<Box<dyn Cloud
     let code = DepthCode { camera, scale: options.depth_scale.unwrap_or(SCALE) };
     let (files, stamps) = (paths.len() as u64, NameStamps::of(&paths));
     let frames = ImageFrames { files, paths: paths.into_iter(), stamps, lost: 0, first_bad: None };
-    Ok(Box::new(DepthFrames::new("depth images".to_owned(), Box::new(frames), code)))
+    Ok(Box::new(DepthFrames::new("depth images".to_owned(), Box::new(frames), code, options.attributes)))
 }
 
 impl Frames for ImageFrames {
@@ -70,7 +70,10 @@ impl Frames for ImageFrames {
             }
             self.lost += u64::from(head.world_from_sensor.is_none());
         }
-        Ok(Some(Frame { path, head }))
+        // As in the 7-Scenes data set.
+        let colours = path.with_file_name(format!("{stem}.color.png"));
+        let colours = Some(colours).filter(|colours| *colours != path && colours.exists());
+        Ok(Some(Frame { path, head, colours }))
     }
 
     fn len_hint(&self) -> Option<u64> {

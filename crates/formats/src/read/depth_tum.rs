@@ -1,4 +1,5 @@
 use super::cloud::{CloudHead, CloudSource};
+use super::colour_list::ColourList;
 use super::depth_frames::{DepthCode, DepthFrames, Frame, Frames};
 use super::inside::is_inside;
 use super::intrinsics::Intrinsics;
@@ -20,6 +21,7 @@ struct TumFrames {
     bad: u64,
     first_bad: Option<Error>,
     has_frame: bool,
+    colours: Option<ColourList>,
 }
 
 /// Image units per metre.
@@ -46,8 +48,14 @@ pub(crate) fn open(folder: &Path, options: &ReadOptions) -> Result<Box<dyn Cloud
         bad: 0,
         first_bad: None,
         has_frame: false,
+        colours: if options.attributes.colours { ColourList::of(folder)? } else { None },
     };
-    Ok(Box::new(DepthFrames::new("depth images (TUM RGB-D)".to_owned(), Box::new(frames), code)))
+    Ok(Box::new(DepthFrames::new(
+        "depth images (TUM RGB-D)".to_owned(),
+        Box::new(frames),
+        code,
+        options.attributes,
+    )))
 }
 
 impl Frames for TumFrames {
@@ -68,7 +76,11 @@ impl Frames for TumFrames {
                     let path = self.folder.join(file);
                     let head = CloudHead { stamp_ns: Some(stamp_ns), ..head_of(&path) };
                     self.has_frame = true;
-                    return Ok(Some(Frame { path, head }));
+                    let colours = match &mut self.colours {
+                        Some(list) => list.at(stamp_ns)?,
+                        None => None,
+                    };
+                    return Ok(Some(Frame { path, head, colours }));
                 }
                 Err(reason) => {
                     self.bad += 1;
@@ -90,7 +102,7 @@ impl Frames for TumFrames {
 }
 
 /// Parses the stamp and the file name of a line.
-fn frame(line: &str) -> std::result::Result<(i64, &str), String> {
+pub(super) fn frame(line: &str) -> std::result::Result<(i64, &str), String> {
     let Some((stamp, file)) = line.split_once([' ', '\t', ',']) else {
         return Err("a line must have a time stamp in seconds and the file name of a depth image".into());
     };

@@ -1,3 +1,4 @@
+use super::attribute_columns::AttributeValues;
 use super::cloud::{CloudHead, CloudPoint, CloudSource};
 use super::e57_packets::check_packets;
 use super::e57_pages::{PAGE_BYTES, Pages};
@@ -8,10 +9,13 @@ use super::xml_check::XmlCheck;
 use crate::poses::RigidPose;
 use crate::read_options::ReadOptions;
 use crate::spill::Budget;
-use e57::{CartesianCoordinate, E57Reader, PointCloud, RecordDataType, RecordName, SphericalCoordinate};
+use e57::{
+    CartesianCoordinate, E57Reader, PointCloud, Record, RecordDataType, RecordName, SphericalCoordinate,
+};
 use std::fs::File;
 use std::io::{BufReader, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
+use voxtile::scan::AttributeSet;
 use voxtile::{Error, FormatError, Result};
 
 /// Source of the scans of an E57 file.
@@ -26,6 +30,10 @@ struct E57 {
     crs: Option<String>,
     remarks: Vec<String>,
     budget: Budget,
+    /// Whether colours are read.
+    reads_colours: bool,
+    /// Converts colours without limits.
+    values: AttributeValues,
 }
 
 /// Opens an E57 file. Each scan is a cloud in the frame of its scanner, with its pose. A scan without a pose is in the
@@ -56,7 +64,19 @@ pub(crate) fn open(path: &Path, options: &ReadOptions) -> Result<Box<dyn CloudSo
     }
     let (next, is_read) = (0, true);
     let (path, budget) = (path.to_owned(), budget.clone());
-    Ok(Box::new(E57 { path, reader, scans, next, is_read, has_origin, crs, remarks, budget }))
+    Ok(Box::new(E57 {
+        path,
+        reader,
+        scans,
+        next,
+        is_read,
+        has_origin,
+        crs,
+        remarks,
+        budget,
+        reads_colours: options.attributes.colours,
+        values: AttributeValues::default(),
+    }))
 }
 
 /// Checks that the XML section fits in memory and can be parsed quickly. The library holds all of it, as text and as a
@@ -126,6 +146,34 @@ fn has_bits(scan: &PointCloud) -> bool {
     })
 }
 
+fn has_field(scan: &PointCloud, name: &RecordName) -> bool {
+    scan.prototype.iter().any(|record| record.name == *name)
+}
+
+const COLOURS: [RecordName; 3] = [RecordName::ColorRed, RecordName::ColorGreen, RecordName::ColorBlue];
+
+fn has_colours(scan: &PointCloud) -> bool {
+    COLOURS.iter().all(|name| has_field(scan, name))
+}
+
+/// Returns whether the library knows the range of colours: from limits of the scan, or else of the fields.
+fn has_colour_scale(scan: &PointCloud) -> bool {
+    let has_limits = scan.color_limits.as_ref().is_some_and(|limits| {
+        let all = [
+            (&limits.red_min, &limits.red_max),
+            (&limits.green_min, &limits.green_max),
+            (&limits.blue_min, &limits.blue_max),
+        ];
+        all.iter().all(|(low, high)| low.is_some() && high.is_some())
+    });
+    let has_range = |record: &Record| match record.data_type {
+        RecordDataType::Single { min, max } => min.is_some() && max.is_some(),
+        RecordDataType::Double { min, max } => min.is_some() && max.is_some(),
+        RecordDataType::ScaledInteger { .. } | RecordDataType::Integer { .. } => true,
+    };
+    has_limits || scan.prototype.iter().filter(|record| COLOURS.contains(&record.name)).all(has_range)
+}
+
 fn pose(scan: &PointCloud) -> Option<RigidPose> {
     let transform = scan.transform.as_ref()?;
     let (at, turn) = (&transform.translation, &transform.rotation);
@@ -162,7 +210,8 @@ impl CloudSource for E57 {
             world_from_sensor: pose,
             points: Some(scan.records),
             fields: scan.prototype.iter().map(|record| name_of(&record.name)).collect(),
-            has_intensities: scan.prototype.iter().any(|record| record.name == RecordName::Intensity),
+            has_intensities: has_field(scan, &RecordName::Intensity),
+            attributes: AttributeSet { colours: self.reads_colours && has_colours(scan), classes: false },
             ..one
         }))
     }
@@ -196,18 +245,27 @@ impl CloudSource for E57 {
             guarded(|| self.reader.pointcloud_simple(scan)).map_err(|reason| wrong(0, reason))?;
         points.apply_pose(false);
         points.normalize_intensity(false);
-        points.normalize_color(false);
+        points.intensity_to_color(false);
+        let reads_colours = self.reads_colours && has_colours(scan);
+        let is_scaled = reads_colours && has_colour_scale(scan);
+        points.normalize_color(is_scaled);
         while let Some(point) = guarded(|| points.next().transpose()).map_err(|reason| wrong(done, reason))? {
             done += 1;
             let (position_m, is_return) = place(&point.cartesian, &point.spherical);
             let intensity = point.intensity.unwrap_or(0.0);
-            visit(CloudPoint { intensity, is_return, ..CloudPoint::hit(position_m) })?;
+            let colour =
+                point.color.filter(|_| reads_colours).map(|color| [color.red, color.green, color.blue]);
+            let colour = match is_scaled {
+                true => colour.map(|colour| colour.map(|share| (255.0 * share).round() as u8)),
+                false => colour.and_then(|colour| self.values.colour(colour.map(f64::from))),
+            };
+            visit(CloudPoint { intensity, colour, is_return, ..CloudPoint::hit(position_m) })?;
         }
         Ok(())
     }
 
     fn remarks(&self) -> Vec<String> {
-        self.remarks.clone()
+        self.remarks.iter().cloned().chain(self.values.remarks()).collect()
     }
 
     fn crs(&self) -> Option<&str> {

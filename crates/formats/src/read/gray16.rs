@@ -3,7 +3,7 @@
 use std::io::{BufRead, Seek};
 
 /// Memory limit of the decoder, which holds a few rows. Images may be a million pixels wide.
-const MAX_DECODER_BYTES: usize = 8 << 20;
+pub(super) const MAX_DECODER_BYTES: usize = 8 << 20;
 
 /// Byte offset of an error and its reason.
 type Wrong = (u64, String);

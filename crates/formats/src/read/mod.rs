@@ -7,6 +7,8 @@ pub(crate) mod attribute_columns;
 pub(crate) mod bin;
 mod bin_columns;
 pub(crate) mod cloud;
+mod colour_image;
+mod colour_list;
 mod columns;
 pub(crate) mod companions;
 pub(crate) mod crs_unit;
@@ -30,6 +32,7 @@ pub(crate) mod guard;
 mod input_file;
 pub(crate) mod inside;
 mod intrinsics;
+mod label_file;
 #[cfg(feature = "las")]
 pub(crate) mod las;
 #[cfg(feature = "las")]
@@ -95,4 +98,4 @@ pub use pcd::read_pcd;
 pub use points::read_points;
 pub use scan_graph::read_scan_graph;
 pub use scan_log::read_scan_log;
-pub use scan_stream::read_scan_stream;
+pub use scan_stream::{read_scan_stream, read_scan_stream_with};

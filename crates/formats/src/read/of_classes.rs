@@ -30,6 +30,14 @@ pub(crate) fn without_classes(input: &str) -> Error {
     Error::argument("only_class, skip_class", reason)
 }
 
+/// Returns the error for a selection of returns of an input that does not number them.
+pub(crate) fn without_returns(input: &str) -> Error {
+    let reason = format!(
+        "{input}, does not number the returns of a pulse as LAS files do: omit the option for this input"
+    );
+    Error::argument("returns", reason)
+}
+
 /// Returns a remark on points that were left out.
 pub(crate) fn left_out_remark(left_out: u64, by: &str) -> Option<String> {
     let points = if left_out == 1 { "point was" } else { "points were" };

@@ -1,37 +1,58 @@
+use super::of_classes::{left_out_remark, without_classes, without_returns};
 use super::stream_input::{AnyInput, FileInput, StreamInput};
+use crate::class_selection::{ClassSelection, Returns};
 use crate::read_options::ReadOptions;
 use crate::scans::Fingerprint;
 use crate::scans::PointStore;
-use crate::scans::{FLAG_INTENSITIES, MAGIC, MAX_LABEL_BYTES, VERSION};
+use crate::scans::{FLAG_CLASSES, FLAG_COLOURS, FLAG_INTENSITIES, MAGIC, MAX_LABEL_BYTES, VERSION};
 use crate::scans::{ScanHead, ScanSource};
 use std::io::{ErrorKind, Read};
 use std::path::{Path, PathBuf};
-use voxtile::scan::Pose;
+use voxtile::scan::{AttributeSet, Pose};
 use voxtile::{Error, FormatError, Result};
 
 /// Reads voxtile's scan stream, as written by a [`ScanStreamWriter`](crate::ScanStreamWriter), scan by scan, from a
 /// file or a pipe.
 ///
-/// `path` is used for errors. With `is_file`, the file is opened for the fingerprint. Otherwise the fingerprint is the
+/// Attributes of points are skipped; see [`read_scan_stream_with`]. `path` is used for errors. With `is_file`, the file is opened for the fingerprint. Otherwise the fingerprint is the
 /// label of the stream, and an error if it has none. Reads are small, so `input` should be buffered.
 ///
 /// # Errors
 ///
 /// The input fails or has an invalid header. Errors in a scan are returned with that scan.
 pub fn read_scan_stream<R: Read>(input: R, path: &Path, is_file: bool) -> Result<impl ScanSource + use<R>> {
-    begin(AnyInput(input), path, is_file)
+    begin(AnyInput(input), path, is_file, &ReadOptions::default())
 }
 
-/// As [`read_scan_stream`], for a file. The points of skipped scans are not read.
+/// As [`read_scan_stream`], with the attributes and the classes of [`ReadOptions`].
 ///
 /// # Errors
 ///
-/// As for [`read_scan_stream`].
-pub(crate) fn open(path: &Path, _: &ReadOptions) -> Result<Box<dyn ScanSource + Send>> {
-    Ok(Box::new(begin(FileInput::open(path)?, path, true)?))
+/// As for [`read_scan_stream`]. Also fails if classes are selected and the points have none.
+pub fn read_scan_stream_with<R: Read>(
+    input: R,
+    path: &Path,
+    is_file: bool,
+    options: &ReadOptions,
+) -> Result<impl ScanSource + use<R>> {
+    begin(AnyInput(input), path, is_file, options)
 }
 
-fn begin<R: StreamInput>(input: R, path: &Path, is_file: bool) -> Result<ScanStream<R>> {
+/// As [`read_scan_stream_with`], for a file. The points of skipped scans are not read.
+///
+/// # Errors
+///
+/// As for [`read_scan_stream_with`].
+pub(crate) fn open(path: &Path, options: &ReadOptions) -> Result<Box<dyn ScanSource + Send>> {
+    Ok(Box::new(begin(FileInput::open(path)?, path, true, options)?))
+}
+
+fn begin<R: StreamInput>(
+    input: R,
+    path: &Path,
+    is_file: bool,
+    options: &ReadOptions,
+) -> Result<ScanStream<R>> {
     let mut stream = ScanStream {
         path: path.to_owned(),
         is_file,
@@ -39,11 +60,21 @@ fn begin<R: StreamInput>(input: R, path: &Path, is_file: bool) -> Result<ScanStr
         offset: 0,
         label: String::new(),
         has_intensities: false,
+        attributes: AttributeSet::NONE,
+        wanted: options.attributes,
+        classes: options.classes.clone(),
+        left_out: 0,
         done: 0,
         is_past_error: false,
         chunk: Vec::new(),
     };
     stream.read_header()?;
+    if options.returns != Returns::All {
+        return Err(without_returns(&format!("{}, a scan stream", path.display())));
+    }
+    if !(stream.classes.is_everything() || stream.attributes.classes) {
+        return Err(without_classes(&path.display().to_string()));
+    }
     Ok(stream)
 }
 
@@ -54,6 +85,12 @@ struct ScanStream<R> {
     offset: u64,
     label: String,
     has_intensities: bool,
+    /// Attributes in the stream, and those to return.
+    attributes: AttributeSet,
+    wanted: AttributeSet,
+    classes: ClassSelection,
+    /// Number of points left out by their class.
+    left_out: u64,
     done: u64,
     /// Whether reading can continue after the scan that caused an error.
     is_past_error: bool,
@@ -68,6 +105,11 @@ struct Head {
     pose: [f64; 7],
 }
 
+/// Sizes of the parts of a point.
+const XYZ_BYTES: usize = 12;
+const INTENSITY_BYTES: usize = 4;
+const COLOUR_BYTES: usize = 4;
+const CLASS_BYTES: usize = 2;
 const COUNT_BYTES: usize = 4;
 const POSE_BYTES: usize = 56;
 
@@ -89,10 +131,12 @@ impl<R: StreamInput> ScanStream<R> {
             );
         }
         let flags = u32::from_le_bytes(self.bytes("the flags")?);
-        if flags & !FLAG_INTENSITIES != 0 {
+        if flags & !(FLAG_INTENSITIES | FLAG_COLOURS | FLAG_CLASSES) != 0 {
             return Err(self.wrong(12, format!("flags {flags:#x} are unknown")));
         }
         self.has_intensities = flags & FLAG_INTENSITIES != 0;
+        self.attributes =
+            AttributeSet { colours: flags & FLAG_COLOURS != 0, classes: flags & FLAG_CLASSES != 0 };
         let length = u32::from_le_bytes(self.bytes("the length of the label")?);
         if length > MAX_LABEL_BYTES {
             return Err(self
@@ -148,7 +192,41 @@ impl<R: StreamInput> ScanStream<R> {
     }
 
     fn point_bytes(&self) -> usize {
-        if self.has_intensities { 16 } else { 12 }
+        let AttributeSet { colours, classes } = self.attributes;
+        XYZ_BYTES
+            + if self.has_intensities { INTENSITY_BYTES } else { 0 }
+            + if colours { COLOUR_BYTES } else { 0 }
+            + if classes { CLASS_BYTES } else { 0 }
+    }
+
+    /// Adds the points of the chunk, which have attributes.
+    fn push_attributed(&mut self, points: &mut PointStore) -> Result<()> {
+        let AttributeSet { colours, classes } = self.attributes;
+        for record in self.chunk.chunks_exact(self.point_bytes()) {
+            let mut rest = record;
+            let mut take = |count: usize| {
+                let (taken, left) = rest.split_at_checked(count).unwrap_or((rest, &[]));
+                rest = left;
+                taken
+            };
+            let float = |bytes: &[u8]| f32::from_le_bytes(bytes.first_chunk().copied().unwrap_or_default());
+            let point = [(); 3].map(|()| f64::from(float(take(size_of::<f32>()))));
+            let intensity = if self.has_intensities { float(take(INTENSITY_BYTES)) } else { 0.0 };
+            let colour = match if colours { take(COLOUR_BYTES) } else { &[] } {
+                [1..=255, colour @ ..] => colour.first_chunk().copied(),
+                _ => None,
+            };
+            let class = match if classes { take(CLASS_BYTES) } else { &[] } {
+                [1..=255, class] => Some(*class),
+                _ => None,
+            };
+            if self.classes.takes(class) {
+                points.push_with(point, intensity, colour, class)?;
+            } else {
+                self.left_out += 1;
+            }
+        }
+        Ok(())
     }
 
     /// Reads encoded points.
@@ -172,7 +250,11 @@ impl<R: StreamInput> ScanStream<R> {
     /// Creates the error for a stream that ends `bytes` bytes after the start of the current points.
     fn ends_in_points(&self, bytes: u64) -> Error {
         let number = bytes - bytes % 4;
-        let what = if number % self.point_bytes() as u64 == 12 { "an intensity" } else { "a point" };
+        let what = match (bytes % self.point_bytes() as u64) as usize {
+            0..XYZ_BYTES => "a point",
+            12..16 if self.has_intensities => "an intensity",
+            _ => "the attributes of a point",
+        };
         self.wrong(self.offset + number, format!("the stream ends in {what}"))
     }
 
@@ -218,12 +300,20 @@ impl<R: StreamInput> ScanSource for ScanStream<R> {
         let Some(Head { count, pose_at, pose }) = self.next_head()? else { return Ok(None) };
         self.is_past_error = false;
         let count = count as usize;
-        points.begin(self.has_intensities);
+        let AttributeSet { colours, classes } = self.attributes;
+        let is_wanted =
+            AttributeSet { colours: colours && self.wanted.colours, classes: classes && self.wanted.classes };
+        points.begin_with(self.has_intensities, is_wanted);
         points.reserve(count.min(MAX_RESERVED));
         let mut left = count;
         while left > 0 {
             let here = left.min(CHUNK_POINTS);
             self.read_chunk(here)?;
+            if !self.attributes.is_none() {
+                self.push_attributed(points)?;
+                left -= here;
+                continue;
+            }
             let (numbers, _) = self.chunk.as_chunks::<4>();
             let number = |bytes: [u8; 4]| f32::from_le_bytes(bytes);
             let point = |[x, y, z]: [[u8; 4]; 3]| [x, y, z].map(|bytes| f64::from(number(bytes)));
@@ -241,6 +331,10 @@ impl<R: StreamInput> ScanSource for ScanStream<R> {
         self.is_past_error = pose.is_err();
         let world_from_sensor = pose?;
         Ok(Some(ScanHead { name, stamp_ns: None, world_from_sensor }))
+    }
+
+    fn remarks(&self) -> Vec<String> {
+        left_out_remark(self.left_out, "their class").into_iter().collect()
     }
 
     fn skip(&mut self, scans: usize) -> Result<usize> {

@@ -66,9 +66,10 @@ pub(crate) fn check_start(start: &[u8], is_named: bool) -> std::result::Result<(
 pub(crate) fn open(
     path: &Path,
     mut head: CloudHead,
-    _: &ReadOptions,
+    options: &ReadOptions,
 ) -> Result<(CloudHead, Box<dyn Points>)> {
-    let (columns, skipped_rows) = (Columns::default(), SkippedRows::default());
+    let (mut columns, skipped_rows) = (Columns::default(), SkippedRows::default());
+    columns.wanted = options.attributes_to_read();
     let mut points =
         TextPoints { lines: Lines::open(path)?, columns, skipped_rows, first: None, is_at_end: false };
     points.columns.clock = super::columns::Clock::new(head.stamp_ns);
@@ -86,6 +87,7 @@ pub(crate) fn open(
         }
     }
     head.fields = points.columns.names.clone();
+    head.attributes = points.columns.attributes();
     if let Some(meaning) = points.columns.meaning() {
         head.has_intensities = meaning.intensity.is_some();
         head.has_times = meaning.time.is_some();

@@ -1,9 +1,11 @@
 //! Line-by-line parser of a text of points.
 
+use super::attribute_columns::{AttributeColumns, AttributeValues, ColourColumns};
 use super::cloud::CloudPoint;
 use super::columns::{Clock, Meaning};
 use super::text_header::{are_poses, names_of, requested_separator, unit_of_comment, units_row};
 use super::text_line::{Separator, comment_of, digits_behind_comma, without_end};
+use voxtile::scan::AttributeSet;
 
 /// Meaning of a line.
 #[derive(Debug, PartialEq)]
@@ -27,6 +29,10 @@ pub(super) struct Columns {
     requested: Option<Separator>,
     are_named: bool,
     meaning: Option<Meaning>,
+    /// Attributes to read, and their columns. Only named columns have attributes.
+    pub(super) wanted: AttributeSet,
+    attributes: AttributeColumns,
+    values: AttributeValues,
     has_points: bool,
     /// Whether every cell of the first point is a number.
     are_numbers: bool,
@@ -89,10 +95,15 @@ impl Columns {
         self.meaning.as_ref()
     }
 
+    /// Returns which of the wanted attributes the points have.
+    pub(super) fn attributes(&self) -> AttributeSet {
+        self.attributes.set()
+    }
+
     /// Returns remarks for the user about the columns.
     pub(super) fn remarks(&self) -> Vec<String> {
         let units = self.meaning.as_ref().and_then(Meaning::remark);
-        self.notes.iter().cloned().chain(units).collect()
+        self.notes.iter().cloned().chain(units).chain(self.values.remarks()).collect()
     }
 
     /// Returns a remark for the user at the end of the text.
@@ -225,13 +236,19 @@ impl Columns {
         let is_one_more = columns == self.names.len() + 1 && line.trim_start().starts_with('"');
         self.unnamed = usize::from(is_one_more);
         // Optional columns may contain words and are then ignored.
-        for at in meaning.intensity.into_iter().chain(meaning.time.map(|time| time.at)) {
+        let attributes = self.attributes;
+        let optional = meaning.intensity.into_iter().chain(meaning.time.map(|time| time.at));
+        for at in optional.chain(attributes.all()) {
             let cell = cells.get(at + self.unnamed).copied().unwrap_or_default();
             if cell.is_empty() || separator.number(cell).is_some() {
                 continue;
             }
             meaning.intensity = meaning.intensity.filter(|intensity| *intensity != at);
             meaning.time = meaning.time.filter(|time| time.at != at);
+            self.attributes.class = self.attributes.class.filter(|class| *class != at);
+            let is_colour =
+                |columns: &ColourColumns| matches!(columns, ColourColumns::Each(all) if all.contains(&at));
+            self.attributes.colour = self.attributes.colour.filter(|columns| !is_colour(columns));
             let name = self.names.get(at).map(String::as_str).unwrap_or_default();
             self.notes.push(format!("column `{name:.40}` has no numbers (`{cell:.20}`) and is ignored"));
         }
@@ -240,6 +257,7 @@ impl Columns {
             Ok(point) => Ok(point),
             Err(reason) => {
                 self.meaning = before;
+                self.attributes = attributes;
                 self.notes.clear();
                 Ok(if self.take_names(line)? { Line::Nothing } else { Line::Unread(reason) })
             }
@@ -289,6 +307,7 @@ impl Columns {
         if are_poses(&names) {
             self.notes.push("has columns qx qy qz qw: if these are poses, use `poses` FILE".into());
         }
+        self.attributes = AttributeColumns::of(names.iter().map(String::as_str), self.wanted, |_| false);
         (self.names, self.meaning, self.are_named) = (names, Some(meaning), true);
         Ok(true)
     }
@@ -309,7 +328,11 @@ impl Columns {
         let xyz = [value(x)?, value(y)?, value(z)?];
         let intensity = meaning.intensity.map(value).transpose()?;
         let time = meaning.time.map(|time| value(time.at)).transpose()?;
-        Ok(self.clock.point_of(&meaning, xyz, intensity, time))
+        let mut point = self.clock.point_of(&meaning, xyz, intensity, time);
+        // An attribute that is missing or not a number is unknown.
+        let known = |at: usize| value(at).unwrap_or(f64::NAN);
+        self.attributes.set_in(&mut point, &mut self.values, known, |_| None);
+        Ok(point)
     }
 }
 

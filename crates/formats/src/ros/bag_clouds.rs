@@ -8,6 +8,7 @@ use super::open::open_recording_within;
 use super::recording::{Message, Recording, Topic};
 use super::registered::find_registered;
 use super::wire::Wire;
+use crate::read::attribute_columns::AttributeValues;
 use crate::read::cloud::{CloudHead, CloudPoint, CloudSource, PoseAt};
 use crate::spill::{Bytes, FilePart};
 use std::collections::BTreeMap;
@@ -35,6 +36,10 @@ pub struct BagClouds {
     without_stamp: u64,
     /// Number of clouds for each repair of inconsistent messages.
     repaired: BTreeMap<&'static str, u64>,
+    /// Attributes to read.
+    attributes: AttributeSet,
+    /// Converts values to attributes.
+    values: AttributeValues,
 }
 
 /// Message of the current cloud.
@@ -91,6 +96,8 @@ pub fn open_bag(paths: &[PathBuf], options: &BagOptions) -> Result<BagClouds> {
         frame: None,
         without_stamp: 0,
         repaired: BTreeMap::new(),
+        attributes: options.attributes,
+        values: AttributeValues::default(),
     })
 }
 
@@ -190,11 +197,13 @@ impl CloudSource for BagClouds {
         let number = self.next;
         self.next += 1;
         let message = self.current(message, number)?;
-        let cloud = self.decode(&message, number)?;
+        let mut cloud = self.decode(&message, number)?;
+        cloud.read_attributes(self.attributes, AttributeValues::default());
         let header = cloud.header().clone();
         let stamp_ns = stamp_of(&header, &message);
         let (points, fields) = (cloud.points_claimed(), cloud.fields());
         let (has_intensities, has_times) = (cloud.has_intensities(), cloud.has_times());
+        let attributes = cloud.attributes();
         for repair in cloud.repairs().to_vec() {
             *self.repaired.entry(repair).or_default() += 1;
         }
@@ -210,7 +219,7 @@ impl CloudSource for BagClouds {
             fields,
             has_intensities,
             has_times,
-            attributes: AttributeSet::NONE,
+            attributes,
         };
         self.current = Some(message);
         self.frame.clone_from(&head.frame);
@@ -223,7 +232,10 @@ impl CloudSource for BagClouds {
         let mut cloud = self.decode(&message, number)?;
         let stamp_ns = stamp_of(cloud.header(), &message);
         cloud.count_times_from(stamp_ns);
+        cloud.read_attributes(self.attributes, self.values.clone());
         let shortage = cloud.visit(message.part.as_ref(), visit)?;
+        let values = cloud.into_values();
+        self.values = values.unwrap_or_default();
         shortage.map_or(Ok(()), |error| Err(self.wrong(number, &error)))
     }
 
@@ -236,6 +248,7 @@ impl CloudSource for BagClouds {
         let mut remarks = self.recording.remarks();
         remarks.extend(self.chosen.remarks.iter().cloned());
         remarks.extend(self.poses.remarks());
+        remarks.extend(self.values.remarks());
         remarks.extend(self.repaired.iter().map(|(repair, count)| format!("{count} clouds {repair}")));
         if self.without_stamp > 0 {
             let count = self.without_stamp;

@@ -1,5 +1,6 @@
 use crate::spill::Budget;
 use std::path::PathBuf;
+use voxtile::scan::AttributeSet;
 
 /// Settings for reading a recording: the clouds and the origin of their poses.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -19,6 +20,8 @@ pub struct BagOptions {
     pub is_world_frame: bool,
     /// Whether poses are also searched for in topics not named here, for clouds that are already in the map frame.
     pub are_poses_needed: bool,
+    /// Attributes of points to read.
+    pub attributes: AttributeSet,
     /// Memory budget in bytes for chunks, messages and poses. Data beyond it goes to temporary files.
     pub memory_bytes: usize,
     /// Folder for decompressed and other temporary files. `None`: the system's.
@@ -42,6 +45,7 @@ impl Default for BagOptions {
             most_gap_ns: None,
             is_world_frame: false,
             are_poses_needed: true,
+            attributes: AttributeSet::NONE,
             memory_bytes: Budget::DEFAULT_BYTES,
             scratch: None,
         }

@@ -2,9 +2,11 @@ use super::messages::{
     CameraInfo, CompressedDepth, Header, Image, LaserScan, LivoxCustom, MessageKind, PointCloud, PointCloud2,
 };
 use super::wire::{Decoded, Wire, WireError};
+use crate::read::attribute_columns::AttributeValues;
 use crate::read::cloud::CloudPoint;
 use crate::spill::FilePart;
 use voxtile::Result;
+use voxtile::scan::AttributeSet;
 
 /// A decoded message that is a cloud.
 pub(super) enum CloudMessage<'a> {
@@ -100,6 +102,29 @@ impl<'a> CloudMessage<'a> {
             Self::Livox(_) => true,
             Self::LaserScan(scan) => !scan.intensities.is_empty(),
             Self::Depth(..) | Self::CompressedDepth(..) => false,
+        }
+    }
+
+    /// Sets the attributes to read. Only PointCloud2 has attributes. `values` are those of the previous message.
+    pub(super) fn read_attributes(&mut self, wanted: AttributeSet, values: AttributeValues) {
+        if let Self::PointCloud2(cloud) = self {
+            cloud.read_attributes(wanted, values);
+        }
+    }
+
+    /// Returns which of the attributes to read the points have.
+    pub(super) fn attributes(&self) -> AttributeSet {
+        match self {
+            Self::PointCloud2(cloud) => cloud.attributes(),
+            _ => AttributeSet::NONE,
+        }
+    }
+
+    /// Returns the converter of attributes, if the message has some.
+    pub(super) fn into_values(self) -> Option<AttributeValues> {
+        match self {
+            Self::PointCloud2(cloud) => Some(cloud.into_values()),
+            _ => None,
         }
     }
 

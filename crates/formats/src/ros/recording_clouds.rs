@@ -27,6 +27,7 @@ pub(crate) fn open_parts(paths: &[PathBuf], options: &ReadOptions) -> Result<Box
         most_gap_ns: Some(most_gap_ns(options.clouds.pose_tolerance_ns)),
         is_world_frame: options.clouds.is_world_frame,
         are_poses_needed: options.clouds.are_poses_needed,
+        attributes: options.attributes_to_read(),
         memory_bytes: options.memory_bytes,
         scratch: options.scratch.clone(),
     };

@@ -17,7 +17,9 @@ pub use point_store::{PointBudget, PointStore};
 pub use scan_chain::{ScanChain, ScanFingerprint};
 pub use scan_reach::ScanReach;
 pub use scan_stream_writer::ScanStreamWriter;
-pub(crate) use scan_stream_writer::{FLAG_INTENSITIES, MAGIC, MAX_LABEL_BYTES, VERSION};
+pub(crate) use scan_stream_writer::{
+    FLAG_CLASSES, FLAG_COLOURS, FLAG_INTENSITIES, MAGIC, MAX_LABEL_BYTES, VERSION,
+};
 pub use selected_scans::Selection;
 pub use sensor_scan::SensorScan;
 pub use source::{ScanHead, ScanSource};

@@ -8,6 +8,7 @@ use std::fs;
 use std::path::Path;
 use tempfile::TempDir;
 use voxtile::Error;
+use voxtile::scan::AttributeSet;
 use voxtile_formats::CloudSource;
 use voxtile_formats::poses::{Found, Trajectory};
 use voxtile_formats::ros::messages::{
@@ -85,6 +86,7 @@ fn clouds(data: &[u8], name: &str, format: &str, scan_period_s: f64) -> bool {
         format: Some(format.to_owned()),
         scan_period_s,
         memory_bytes: 1 << 16,
+        attributes: AttributeSet { colours: true, classes: true },
         ..ReadOptions::default()
     };
     with_file(name, data, |path| {

@@ -20,6 +20,11 @@ pub struct Las {
     pub records: Vec<(&'static str, u16, Vec<u8>)>,
     /// GPS time of the first point.
     pub start_s: f64,
+    /// Red, green and blue of a point.
+    pub colour: fn(usize) -> [u16; 3],
+    pub class: fn(usize) -> u8,
+    /// Number of the return and number of returns of the pulse.
+    pub returns: fn(usize) -> [u8; 2],
 }
 
 /// Compression of points.
@@ -46,6 +51,9 @@ impl Las {
             offsets: [500_000.0, 4_180_000.0, 0.0],
             records: Vec::new(),
             start_s: 1000.0,
+            colour: |_| [0; 3],
+            class: |_| 0,
+            returns: |_| [1, 1],
         }
     }
 
@@ -67,7 +75,18 @@ impl Las {
         let mut point = vec![0; self.point_bytes()];
         point[..12].copy_from_slice(Self::whole(k).map(i32::to_le_bytes).as_flattened());
         point[12..14].copy_from_slice(&(k as u16).to_le_bytes());
-        point[14] = 0x11;
+        let [number, count] = (self.returns)(k);
+        point[14] = number | count << if self.format < 6 { 3 } else { 4 };
+        point[if self.format < 6 { 15 } else { 16 }] = (self.class)(k);
+        let colour_at = match self.format {
+            2 => Some(20),
+            3 | 5 => Some(28),
+            7 | 8 | 10 => Some(30),
+            _ => None,
+        };
+        if let Some(at) = colour_at {
+            point[at..at + 6].copy_from_slice((self.colour)(k).map(u16::to_le_bytes).as_flattened());
+        }
         let time_at = match self.format {
             0 | 2 => return point,
             1..=5 => 20,

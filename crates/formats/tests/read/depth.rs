@@ -1,6 +1,7 @@
 use crate::support::{clouds, clouds_with, failure, shared_data};
 use std::fs::{self, File};
 use std::path::Path;
+use voxtile::scan::AttributeSet;
 use voxtile_formats::ReadOptions;
 use voxtile_formats::read::Intrinsics;
 
@@ -169,4 +170,83 @@ fn fifos_among_depth_images_are_refused() {
         let (error, _) = failure(&at(name), &ReadOptions::default());
         assert!(error.contains("is a FIFO") && error.contains("`format`") == is_hinted, "{error}");
     }
+}
+
+fn colour_image(path: &Path, width: u32, color: png::ColorType, bytes: &[u8]) {
+    let pixel_bytes = color.samples() as u32;
+    let height = bytes.len() as u32 / pixel_bytes / width;
+    let mut encoder = png::Encoder::new(File::create(path).unwrap(), width, height);
+    encoder.set_color(color);
+    encoder.write_header().unwrap().write_image_data(bytes).unwrap();
+}
+
+fn with_colours() -> ReadOptions {
+    ReadOptions {
+        intrinsics: Some(Intrinsics::new([525.0, 525.0, 319.5, 239.5]).unwrap()),
+        attributes: AttributeSet { colours: true, classes: false },
+        ..Default::default()
+    }
+}
+
+/// Colours of the points of an image.
+type Colours = Vec<Option<[u8; 3]>>;
+
+fn colours_of(folder: &Path, options: &ReadOptions) -> (Vec<Colours>, Vec<String>) {
+    let mut source = voxtile_formats::open_clouds(folder, options).unwrap();
+    let clouds = crate::support::all(source.as_mut()).unwrap();
+    let of = |(head, points): &crate::support::Cloud| {
+        let colours: Vec<_> = points.iter().map(|point| point.colour).collect();
+        assert_eq!(head.attributes.colours, colours.iter().any(Option::is_some));
+        colours
+    };
+    (clouds.iter().map(of).collect(), source.remarks())
+}
+
+#[test]
+fn pixels_of_seven_scenes_have_the_colours_of_their_image() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    for number in 0..3 {
+        image(&at(&format!("frame-00000{number}.depth.png")), 2, &[2000, 0, 65535, 500]);
+    }
+    let rgb: Vec<u8> = (1..=12).collect();
+    colour_image(&at("frame-000000.color.png"), 2, png::ColorType::Rgb, &rgb);
+    colour_image(&at("frame-000001.color.png"), 2, png::ColorType::Grayscale, &[9, 8, 7, 6]);
+    let (colours, remarks) = colours_of(folder.path(), &with_colours());
+    assert_eq!(colours[0], [[1, 2, 3], [4, 5, 6], [7, 8, 9], [10, 11, 12]].map(Some));
+    assert_eq!(colours[1], [[9; 3], [8; 3], [7; 3], [6; 3]].map(Some));
+    assert_eq!(colours[2], [None; 4]);
+    assert!(remarks.iter().any(|remark| remark.starts_with("1 depth images have no colour")), "{remarks:?}");
+    let without = ReadOptions { attributes: AttributeSet::NONE, ..with_colours() };
+    assert_eq!(colours_of(folder.path(), &without).0, [[None; 4]; 3]);
+    // Images of other sizes, and files that are not images.
+    colour_image(&at("frame-000000.color.png"), 1, png::ColorType::Rgb, &rgb);
+    let (error, points) = failure(folder.path(), &with_colours());
+    assert!(error.contains("frame-000000.color.png: malformed: ") && points == 0, "{error}");
+    assert!(
+        error.contains("has 1 x 4 pixels, but the depth image") && error.contains("has 2 x 2"),
+        "{error}"
+    );
+    fs::write(at("frame-000000.color.png"), "no image").unwrap();
+    assert!(failure(folder.path(), &with_colours()).0.contains("frame-000000.color.png: malformed: "));
+}
+
+#[test]
+fn pixels_of_tum_data_have_the_colours_of_the_nearest_image() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    image(&at("depth.png"), 1, &[5000, 5000]);
+    for shade in [1, 2, 3] {
+        colour_image(&at(&format!("{shade}.png")), 1, png::ColorType::Rgba, &[shade; 8]);
+    }
+    // The last two depth images are not in order of time.
+    let depths = "10.00 depth.png\n10.05 depth.png\n10.5 depth.png\n11 depth.png\n10.051 depth.png\n";
+    fs::write(at("depth.txt"), depths).unwrap();
+    let list =
+        "# colours\n10.01 1.png\nno line\n10.04 2.png\n10.06 ../3.png\n10.061 3.png\n11.0200001 3.png\n";
+    fs::write(at("rgb.txt"), list).unwrap();
+    let (colours, remarks) = colours_of(folder.path(), &with_colours());
+    let shades: Vec<Option<u8>> = colours.iter().map(|image| image[1].map(|colour| colour[2])).collect();
+    assert_eq!(shades, [Some(1), Some(2), None, None, Some(3)]);
+    assert!(remarks[0].starts_with("2 depth images have no colour image"), "{remarks:?}");
 }

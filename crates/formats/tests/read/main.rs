@@ -1,5 +1,10 @@
 //! Tests of reading files of other programs.
 
+/// Colours and classes of points.
+mod attributes;
+/// Colours and classes of LAS files, and selected points.
+#[cfg(feature = "las")]
+mod attributes_las;
 /// Coordinate reference systems.
 #[cfg(all(feature = "las", feature = "e57"))]
 mod crs;

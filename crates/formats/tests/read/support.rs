@@ -75,3 +75,18 @@ pub fn wanted(shift: [f64; 3]) -> Vec<CloudPoint> {
         })
         .collect()
 }
+
+/// Returns random points whose coordinates are floats, with colours and classes. The first point is not black.
+pub fn rows_of(count: usize) -> Vec<crate::attributes::Row> {
+    let mut state = 7_u64;
+    let mut random = |below: u64| {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (state >> 33) % below
+    };
+    let mut row = |_| {
+        let point = [(); 3].map(|()| (random(1 << 20) as f64 - 524_288.0) / 1024.0);
+        let colour = [(); 3].map(|()| random(256) as u8);
+        (point, Some(colour), Some(random(24) as u8))
+    };
+    (0..count).map(&mut row).collect()
+}

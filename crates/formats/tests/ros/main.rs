@@ -1,6 +1,8 @@
 //! Reads recordings written by rosbags and by the MCAP library (tests/fixtures/make_ros.py).
 #![cfg(feature = "ros")]
 
+/// Colours and classes of points.
+mod attributes;
 /// Clouds and poses of intact recordings.
 mod contents;
 /// Truncated, damaged and foreign files.

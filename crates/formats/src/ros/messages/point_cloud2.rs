@@ -1,13 +1,16 @@
 use super::header::Header;
 use super::point_field::{FieldType, PointField};
 use super::point_layout::{
-    Column, TimeColumn, any_of, find, is_little_endian, points_unannounced, position_columns, row_bytes_of,
-    time_column,
+    Column, TimeColumn, any_of, column_of, find, is_little_endian, points_unannounced, position_columns,
+    row_bytes_of, time_column,
 };
+use crate::read::attribute_columns::{AttributeColumns, AttributeValues};
 use crate::read::cloud::CloudPoint;
 use crate::ros::wire::{Decoded, Wire, WireError, WireReader};
 use crate::spill::FilePart;
+use std::cell::RefCell;
 use voxtile::Result;
+use voxtile::scan::AttributeSet;
 
 /// `sensor_msgs/PointCloud2` with its undecoded points.
 #[derive(Clone, Debug)]
@@ -33,6 +36,10 @@ pub struct PointCloud2<'a> {
     z: Option<Column>,
     intensity: Option<Column>,
     time: Option<TimeColumn>,
+    /// Fields of the attributes to read, as indices of `fields`.
+    attributes: AttributeColumns,
+    /// Converts values to attributes.
+    values: RefCell<AttributeValues>,
     repairs: Vec<&'static str>,
 }
 
@@ -121,8 +128,34 @@ impl<'a> PointCloud2<'a> {
             z,
             intensity,
             time,
+            attributes: AttributeColumns::default(),
+            values: RefCell::default(),
             repairs,
         })
+    }
+
+    /// Sets the attributes to read. `values` are those of the previous message.
+    pub(crate) fn read_attributes(&mut self, wanted: AttributeSet, values: AttributeValues) {
+        let column = |at: usize| column_of(self.fields.get(at)?, self.point_bytes);
+        // Fields outside of a point are not there.
+        let names = (0..self.fields.len()).map(|at| column(at).and_then(|_| self.fields.get(at)));
+        let names = names.map(|field| field.map_or("", |field| &field.name));
+        let is_packed = |at: usize| column(at).is_some_and(|column| column.kind.bytes() == size_of::<u32>());
+        let attributes = AttributeColumns::of(names, wanted, is_packed);
+        let kinds = attributes.colour_kinds(|at| column(at).map(|column| column.kind.scalar()));
+        self.attributes = attributes;
+        *self.values.get_mut() = values;
+        self.values.get_mut().continue_with(kinds);
+    }
+
+    /// Returns which of the attributes to read the points have.
+    pub(crate) fn attributes(&self) -> AttributeSet {
+        self.attributes.set()
+    }
+
+    /// Returns the converter of attributes, with its counts.
+    pub(crate) fn into_values(self) -> AttributeValues {
+        self.values.into_inner()
     }
 
     /// Returns whether points have intensities.
@@ -214,14 +247,25 @@ impl<'a> PointCloud2<'a> {
         let position_m = [x_m, y_m, self.z.map_or(0.0, |column| self.value(point, column))];
         // Sensors write NaN or all zeros for points without a return.
         let is_return = position_m.iter().all(|m| m.is_finite()) && position_m != [0.0; 3];
-        CloudPoint {
+        let mut cloud_point = CloudPoint {
             position_m: if is_return { position_m } else { [f64::NAN; 3] },
             intensity: self.intensity.map_or(0.0, |column| self.value(point, column) as f32),
             time_s: self.time.map_or(0.0, |time| self.time_s(point, time)),
             colour: None,
             class: None,
             is_return,
+        };
+        if !self.attributes.set().is_none() {
+            let column = |at: usize| column_of(self.fields.get(at)?, self.point_bytes);
+            let value = |at: usize| column(at).map_or(f64::NAN, |column| self.value(point, column));
+            // A packed colour is read as bits, because as a float it may be NaN.
+            let bits = |at: usize| {
+                let kind = FieldType::U32;
+                column(at).map(|column| self.value(point, Column { kind, ..column }) as u32)
+            };
+            self.attributes.set_in(&mut cloud_point, &mut self.values.borrow_mut(), value, bits);
         }
+        cloud_point
     }
 
     /// Decodes a value of a point. Columns are always within a point.

@@ -1,3 +1,4 @@
+use crate::read::scalar::Scalar;
 use crate::ros::wire::{Decoded, WireReader};
 
 /// Type of a field of `sensor_msgs/PointCloud2`.
@@ -76,6 +77,20 @@ impl FieldType {
             Self::I16 | Self::U16 => 2,
             Self::I32 | Self::U32 | Self::F32 => 4,
             Self::F64 => 8,
+        }
+    }
+
+    /// Returns the equal type of other formats.
+    pub(crate) fn scalar(self) -> Scalar {
+        match self {
+            Self::I8 => Scalar::I8,
+            Self::U8 => Scalar::U8,
+            Self::I16 => Scalar::I16,
+            Self::U16 => Scalar::U16,
+            Self::I32 => Scalar::I32,
+            Self::U32 => Scalar::U32,
+            Self::F32 => Scalar::F32,
+            Self::F64 => Scalar::F64,
         }
     }
 

@@ -138,7 +138,11 @@ fn named<'f>(fields: &'f [PointField], name: &str, is_exact: bool) -> Option<&'f
 
 /// Finds a field that is within a point by name.
 pub(super) fn find(fields: &[PointField], name: &str, is_exact: bool, point_bytes: usize) -> Option<Column> {
-    let field = named(fields, name, is_exact)?;
+    column_of(named(fields, name, is_exact)?, point_bytes)
+}
+
+/// Returns the column of a field that is within a point.
+pub(super) fn column_of(field: &PointField, point_bytes: usize) -> Option<Column> {
     let kind = field.kind?;
     let end = field.offset.checked_add(kind.bytes())?;
     (end <= point_bytes).then_some(Column { offset: field.offset, kind })
