@@ -74,7 +74,13 @@ impl Measured {
     fn stored(&self) -> StoredScan {
         let (name, world_from_sensor) = (String::new(), self.world_from_sensor.into());
         let (points_in_sensor, intensities) = (self.widened(), self.intensities.clone());
-        let scan = SensorScan { name, points_in_sensor, intensities, world_from_sensor };
+        let scan = SensorScan {
+            name,
+            points_in_sensor,
+            intensities,
+            attributes: Default::default(),
+            world_from_sensor,
+        };
         let mut bytes = Vec::new();
         let mut writer = ScanStreamWriter::new(&mut bytes, "", self.intensities.is_some()).unwrap();
         writer.write(&scan).unwrap();
