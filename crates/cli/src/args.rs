@@ -28,7 +28,7 @@ pub use export::{ExportArgs, WhatName};
 pub use local::{LocalArgs, PresetName};
 use log::LevelFilter;
 pub use picture::{PictureArgs, ReportArgs, ViewName};
-pub use read::{FrameName, ReadArgs};
+pub use read::{FrameName, ReadArgs, ReturnsName};
 pub use remap::{RemapArgs, RemovePointsArgs, RemoveScansArgs, ReplayArgs};
 pub use snapshot::{DiffArgs, RevertArgs, SnapshotArgs, SnapshotsArgs};
 use std::ffi::OsString;

@@ -1,6 +1,6 @@
-use crate::args::{FrameName, ReadArgs};
+use crate::args::{FrameName, ReadArgs, ReturnsName};
 use voxtile::Result;
-use voxtile_formats::ReadOptions;
+use voxtile_formats::{ReadOptions, Returns};
 use voxtile_pipeline::numbers::{Mount, point_of, region_of, set_mount, tolerance_ns};
 
 pub fn read_options(args: &ReadArgs) -> Result<ReadOptions> {
@@ -22,6 +22,13 @@ pub fn read_options(args: &ReadArgs) -> Result<ReadOptions> {
     selection.every = args.every;
     selection.ignored =
         args.ignore_box.as_deref().map(|corners| region_of("ignore_box", corners)).transpose()?;
+    options.classes.only_class.clone_from(&args.only_class);
+    options.classes.skip_class.clone_from(&args.skip_class);
+    options.returns = match args.returns {
+        ReturnsName::All => Returns::All,
+        ReturnsName::First => Returns::First,
+        ReturnsName::Last => Returns::Last,
+    };
     let recording = &mut options.recording;
     recording.topic.clone_from(&args.topic);
     recording.odometry_topic.clone_from(&args.odometry);

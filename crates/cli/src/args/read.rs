@@ -55,6 +55,15 @@ pub struct ReadArgs {
     /// Frame of --ignore-box; body needs --extrinsic
     #[arg(long, value_name = "FRAME", default_value = "sensor")]
     pub ignore_frame: FrameName,
+    /// Read only points of these classes, such as 2,6: of LAS, .label files, and fields label or class [default: all]
+    #[arg(long, value_name = "CLASSES", value_delimiter = ',')]
+    pub only_class: Vec<u8>,
+    /// Skip points of these classes; 7,18 are noise in LAS
+    #[arg(long, value_name = "CLASSES", value_delimiter = ',')]
+    pub skip_class: Vec<u8>,
+    /// LAS: returns of a pulse to read
+    #[arg(long, value_name = "WHICH", default_value = "all")]
+    pub returns: ReturnsName,
     /// LAS with GPS times: duration of a scan, in seconds; 0 reads a file as one scan
     #[arg(long, value_name = "S", default_value_t = 0.1)]
     pub scan_period: f64,
@@ -73,6 +82,16 @@ pub struct ReadArgs {
 fn format_help() -> String {
     let known = Registry::default().names(" ");
     format!("Format of the input, if its content does not identify it: {known}")
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum ReturnsName {
+    /// All returns
+    All,
+    /// The first return of each pulse
+    First,
+    /// The last return of each pulse
+    Last,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
