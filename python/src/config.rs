@@ -1,6 +1,7 @@
 //! Configurations of maps from keyword arguments.
 
 use crate::errors::{exception, wrong};
+use crate::layers::layers_of;
 use crate::options::clearings;
 use bytesize::ByteSize;
 use pyo3::prelude::*;
@@ -21,6 +22,7 @@ pub struct ConfigArguments<'a, 'py> {
     pub storage: &'a str,
     pub memory: Option<Bound<'py, PyAny>>,
     pub keep_scans: bool,
+    pub layers: Option<Bound<'py, PyAny>>,
 }
 
 /// Returns the configuration of a new map.
@@ -60,6 +62,7 @@ pub fn config_of(py: Python<'_>, arguments: &ConfigArguments<'_, '_>) -> PyResul
         .with_storage(storage_of(py, arguments.storage)?)
         .with_kept_scans(arguments.keep_scans);
     config.occupancy_threshold = arguments.occupancy_threshold;
+    config.layers = arguments.layers.as_ref().map(layers_of).transpose()?;
     config.memory = memory_of(arguments.memory.as_ref())?;
     config.validated().map_err(raised)
 }

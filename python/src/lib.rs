@@ -24,6 +24,7 @@ mod config;
 mod distance;
 mod errors;
 mod keywords;
+mod layers;
 mod local_map;
 mod map;
 mod operations;

@@ -4,6 +4,7 @@ use crate::arrays::{PointSlice, Points, column, doubles, object, rows};
 use crate::config::{ConfigArguments, bytes_of, config_of};
 use crate::distance::{DistanceField, options_of};
 use crate::errors::{exception, exception_of_kind, wrong};
+use crate::layers;
 use crate::questions::{self, bodies_of};
 use crate::report::InsertReport;
 use crate::scan::GivenScan;
@@ -178,10 +179,12 @@ impl Map {
     /// Lengths are in metres. `tile_size` is a whole number of voxels, by default the one nearest to 10. `memory` bounds all memory that grows with the map: bytes, or a text such as "512MiB"
     /// (the default). `insert_mode` is "per-scan" or "per-ray", `clearing` "octomap" or "guarded",
     /// `sensor_model` "log-odds" or "iwlo", `storage` "octomap" or "compact". `probabilities` of the log-odds model are
-    /// those of a hit and a miss, then the minimum and the maximum.
+    /// those of a hit and a miss, then the minimum and the maximum. `layers` is what the map stores of the points that
+    /// hit a voxel: "colour,intensity=255,class,time,shape" or a part of it, or a list of names.
     #[staticmethod]
     #[pyo3(signature = (path, resolution=0.1, *, tile_size=None, min_range=0.0, max_range=None, insert_mode="per-scan",
-        clearing="octomap", sensor_model="log-odds", probabilities=None, occupancy_threshold=0.5, storage="octomap", memory=None, keep_scans=false))]
+        clearing="octomap", sensor_model="log-odds", probabilities=None, occupancy_threshold=0.5, storage="octomap", memory=None, keep_scans=false,
+        layers=None))]
     #[expect(clippy::too_many_arguments, reason = "keywords, in Python")]
     fn create(
         py: Python<'_>,
@@ -198,6 +201,7 @@ impl Map {
         storage: &str,
         memory: Option<Bound<'_, PyAny>>,
         keep_scans: bool,
+        layers: Option<Bound<'_, PyAny>>,
     ) -> PyResult<Self> {
         let config = config_of(
             py,
@@ -214,6 +218,7 @@ impl Map {
                 storage,
                 memory,
                 keep_scans,
+                layers,
             },
         )?;
         let options = MapOptions::new().config(config).create_new(true);
@@ -316,8 +321,9 @@ impl Map {
     ///
     /// With `pose` (world_from_sensor: a matrix of 4 x 4, seven numbers x y z qx qy qz qw, or a tuple of position and
     /// quaternion) points are in the sensor's frame; with `origin` they are in the world's. Points that are NaN or
-    /// masked are skipped and counted. After an error the map is unchanged.
-    #[pyo3(signature = (points, pose=None, *, origin=None, intensities=None))]
+    /// masked are skipped and counted. `colours` (N x 3, 0 to 255) and `classes` (N, 0 to 255) are for the layers of the
+    /// map; NaN, and a class below 0, mean that a point has none. After an error the map is unchanged.
+    #[pyo3(signature = (points, pose=None, *, origin=None, intensities=None, colours=None, classes=None))]
     fn insert<'py>(
         &self,
         py: Python<'py>,
@@ -325,8 +331,10 @@ impl Map {
         pose: Option<&Bound<'py, PyAny>>,
         origin: Option<&Bound<'py, PyAny>>,
         intensities: Option<&Bound<'py, PyAny>>,
+        colours: Option<&Bound<'py, PyAny>>,
+        classes: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<InsertReport> {
-        let given = GivenScan::of(points, pose, origin, intensities)?;
+        let given = GivenScan::of(points, pose, origin, intensities)?.with_attributes(colours, classes)?;
         let scan = given.scan(py)?;
         let report = self.change(py, scan.len() <= FEW, |mapper| mapper.insert_points(&scan))?;
         Ok(report.into())
@@ -633,6 +641,30 @@ impl Map {
         let source = self.source(py)?;
         let field = finished(py, move |stop| source.ask(stop, |map| map.distance_field(&region, options)))?;
         Ok(DistanceField::new(field))
+    }
+
+    /// What the layers store of the points that hit the voxels at points: a dictionary of arrays. `points` is there in
+    /// any case, the others with their layer: `colour` (N x 3), `intensity`, `intensity_deviation`, `class` (-1 for
+    /// none), `first_ns`, `last_ns`, `mean_offset` from the voxel's center (N x 3, in metres), `covariance` (N x 6: xx,
+    /// yy, zz, xy, xz, yz). NaN, and the lowest integer for times, mean that there is no value.
+    fn layers_at<'py>(&self, points: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyDict>> {
+        let py = points.py();
+        let points = Points::of("points", points)?;
+        let points = points.slice()?;
+        let found = self.ask(py, points.len(), |source, stop| layers::layers_at(source, stop, points))?;
+        layers::arrays(py, &self.config, &found)
+    }
+
+    /// Names of the map's layers; empty without.
+    #[getter]
+    fn layers(&self) -> Vec<&'static str> {
+        self.config.layers().names().collect()
+    }
+
+    /// Digest of the map's layers, as `voxtile digest --layers` prints it.
+    fn layer_digest(&self, py: Python<'_>) -> PyResult<String> {
+        let digest = self.ask(py, usize::MAX, |source, stop| source.ask(stop, |map| map.layer_digest()))?;
+        Ok(digest.to_string())
     }
 
     /// Digest of the map's content, as the command prints it. Equal maps have equal digests.

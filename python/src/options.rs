@@ -7,8 +7,8 @@ use pyo3::prelude::*;
 use std::path::{Path, PathBuf};
 use voxtile::space::Aabb;
 use voxtile::{Clearing, InsertMode, MemoryLimit, Storage};
-use voxtile_formats::ReadOptions;
 use voxtile_formats::write::FileUnit;
+use voxtile_formats::{ReadOptions, Returns};
 use voxtile_pipeline::numbers::{Mount, point_of, region_of, set_mount, tolerance_ns};
 use voxtile_pipeline::{BuildOptions, ExportOptions, SensorModelKind, WhenBehind, WhichVoxels};
 
@@ -25,6 +25,8 @@ const WHEN_BEHIND: [(&str, WhenBehind); 3] =
     [("wait", WhenBehind::Wait), ("drop-oldest", WhenBehind::DropOldest), ("thin", WhenBehind::Thin)];
 const WHICH_VOXELS: [(&str, WhichVoxels); 3] =
     [("occupied", WhichVoxels::Occupied), ("free", WhichVoxels::Free), ("all", WhichVoxels::All)];
+const RETURNS: [(&str, Returns); 3] =
+    [("all", Returns::All), ("first", Returns::First), ("last", Returns::Last)];
 /// Whether the box of ignored points is in the body's frame.
 const FRAMES: [(&str, bool); 2] = [("sensor", false), ("body", true)];
 
@@ -51,6 +53,16 @@ pub fn read_options(py: Python<'_>, keywords: &mut Keywords<'_>) -> PyResult<Rea
     selection.count = keywords.count("count")?;
     selection.every = keywords.count("every")?.unwrap_or(selection.every);
     selection.ignored = region(py, keywords, "ignore_box")?;
+    let classes = |numbers: Option<Vec<f64>>, name| {
+        numbers
+            .unwrap_or_default()
+            .into_iter()
+            .map(|class| class_of(py, name, class))
+            .collect::<PyResult<_>>()
+    };
+    options.classes.only_class = classes(keywords.numbers("only_class")?, "only_class")?;
+    options.classes.skip_class = classes(keywords.numbers("skip_class")?, "skip_class")?;
+    options.returns = keywords.one_of("returns", &RETURNS)?.unwrap_or_default();
     let recording = &mut options.recording;
     recording.topic = keywords.text("topic")?;
     recording.odometry_topic = keywords.text("odometry")?;
@@ -68,6 +80,13 @@ pub fn read_options(py: Python<'_>, keywords: &mut Keywords<'_>) -> PyResult<Rea
     let is_box_of_body = keywords.one_of("ignore_frame", &FRAMES)?.unwrap_or(false);
     set_mount(&mut options, mount, is_box_of_body).map_err(raised)?;
     Ok(options)
+}
+
+/// Returns the number of a class.
+fn class_of(py: Python<'_>, name: &str, class: f64) -> PyResult<u8> {
+    let is_class = (0.0..=255.0).contains(&class) && class.fract() == 0.0;
+    let reason = || wrong(py, name, format!("must be whole numbers from 0 to 255, not {class}"));
+    is_class.then_some(class as u8).ok_or_else(reason)
 }
 
 /// Takes the options of a build (`voxtile.files.BuildOptions`) from the keywords.
@@ -98,6 +117,7 @@ pub fn build_options(
     options.intensity_max = keywords.number("intensity_max")?;
     options.insert_mode = keywords.one_of("insert_mode", &INSERT_MODES)?;
     options.clearing = keywords.one_of("clearing", &clearings())?;
+    options.layers = keywords.parsed("layers", str::parse)?;
     options.keep_scans = keywords.flag("keep_scans")?;
     options.region = region(py, &mut keywords, "region")?;
     options.clear_no_return_m = keywords.number("clear_no_return")?;

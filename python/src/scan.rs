@@ -2,10 +2,11 @@
 
 use crate::arrays::{PointSlice, Points, singles};
 use crate::errors::{exception, wrong};
+use crate::layers::attributes_of;
 use crate::pose::{point_of, pose_of};
 use numpy::PyReadonlyArray1;
 use pyo3::prelude::*;
-use voxtile::{Point, Pose, ScanRef};
+use voxtile::{Point, PointAttributes, Pose, ScanRef};
 
 /// Frame of a scan's points.
 pub enum Frame {
@@ -49,6 +50,7 @@ pub struct GivenScan<'py> {
     points: Points<'py>,
     frame: Frame,
     intensities: Option<PyReadonlyArray1<'py, f32>>,
+    attributes: PointAttributes,
 }
 
 impl<'py> GivenScan<'py> {
@@ -61,7 +63,18 @@ impl<'py> GivenScan<'py> {
     ) -> PyResult<Self> {
         let frame = Frame::of(points.py(), pose, origin)?;
         let intensities = intensities.map(|intensities| singles("intensities", intensities)).transpose()?;
-        Ok(Self { points: Points::of("points", points)?, frame, intensities })
+        let attributes = PointAttributes::default();
+        Ok(Self { points: Points::of("points", points)?, frame, intensities, attributes })
+    }
+
+    /// Adds colours and classes, for the layers of a map.
+    pub fn with_attributes(
+        mut self,
+        colours: Option<&Bound<'py, PyAny>>,
+        classes: Option<&Bound<'py, PyAny>>,
+    ) -> PyResult<Self> {
+        self.attributes = attributes_of(self.points.slice()?.len(), colours, classes)?;
+        Ok(self)
     }
 
     /// Takes a pair of points and pose, or a triple with intensities.
@@ -84,6 +97,7 @@ impl<'py> GivenScan<'py> {
     /// Returns the scan, borrowed.
     pub fn scan(&self, py: Python<'_>) -> PyResult<ScanRef<'_>> {
         let scan = self.frame.scan(self.points.slice()?);
+        let scan = scan.with_attributes(&self.attributes).map_err(|error| exception(py, &error))?;
         match &self.intensities {
             None => Ok(scan),
             Some(intensities) => {

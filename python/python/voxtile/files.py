@@ -44,6 +44,9 @@ class ReadOptions(TypedDict, total=False):
     deskew: bool
     ignore_box: _Corners | None
     ignore_frame: Literal["sensor", "body"]
+    only_class: Sequence[int]
+    skip_class: Sequence[int]
+    returns: Literal["all", "first", "last"]
     scan_period: float
     sensor_origin: Sequence[float] | None
     depth_scale: float | None
@@ -69,6 +72,7 @@ class BuildOptions(ReadOptions, total=False):
     intensity_max: float
     insert_mode: Literal["per-scan", "per-ray"]
     clearing: Literal["octomap", "guarded"]
+    layers: str
     keep_scans: bool
     region: _Corners | None
     clear_no_return: float | None

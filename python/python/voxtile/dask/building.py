@@ -70,6 +70,7 @@ class BuildOptions(ReadOptions, total=False):
     intensity_max: float
     insert_mode: Literal["per-scan", "per-ray"]
     clearing: Literal["octomap", "guarded"]
+    layers: str
     clear_no_return: float | None
 
 
