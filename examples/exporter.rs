@@ -7,7 +7,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
 use voxtile::{MapOptions, MapView, Occupancy};
-use voxtile_formats::write::{OutputFormats, VoxelRow, VoxelsHead, WriteOptions};
+use voxtile_formats::write::{OutputFormats, RowLayers, VoxelRow, VoxelsHead, WriteOptions};
 
 fn main() -> Result<(), Box<dyn Error>> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
@@ -47,6 +47,7 @@ fn main() -> Result<(), Box<dyn Error>> {
                     log_odds: voxel.evidence.log_odds,
                     observation_count: voxel.evidence.observation_count,
                     tile: grid.tile_of_voxel(voxel.index).to_array(),
+                    layers: RowLayers::default(),
                 })?;
             }
         }

@@ -101,4 +101,4 @@ pub use scan::{PointAttributes, Pose, Scan, ScanPoints, ScanRef, ScanReport, Sto
 pub use sensor::{Evidence, SensorModel};
 pub use space::{Aabb, Grid, Point, TileBox, TileIndex, TileSelection, VoxelIndex};
 pub use store::{MapPath, SnapshotName};
-pub use tile::{Voxel, VoxelLayers};
+pub use tile::{ClassVotes, ColourSums, IntensitySums, ShapeSums, TimeSpan, Voxel, VoxelLayers};

@@ -9,12 +9,15 @@ use crate::scan::OFFSETS_PER_VOXEL;
 pub struct VoxelLayers {
     /// Number of points that hit the voxel.
     pub points: u64,
+    /// Sums of the colours.
     pub colour: ColourSums,
+    /// Sums of the intensities.
     pub intensity: IntensitySums,
     /// Votes of the points with a class, by class in ascending order.
     pub classes: Vec<ClassVotes>,
     /// `None` if no scan with a hit had a time stamp.
     pub time: Option<TimeSpan>,
+    /// Sums of the offsets from the center.
     pub shape: ShapeSums,
 }
 
@@ -23,8 +26,11 @@ pub struct VoxelLayers {
 pub struct ColourSums {
     /// Number of points with a colour.
     pub points: u64,
+    /// Sum of red.
     pub red: u64,
+    /// Sum of green.
     pub green: u64,
+    /// Sum of blue.
     pub blue: u64,
 }
 
@@ -33,21 +39,27 @@ pub struct ColourSums {
 pub struct IntensitySums {
     /// Number of points with an intensity.
     pub points: u64,
+    /// Sum of the intensities.
     pub sum: u64,
+    /// Sum of their squares.
     pub squares: u64,
 }
 
 /// Number of points with a class.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ClassVotes {
+    /// Class.
     pub class: u8,
+    /// Number of points.
     pub votes: u64,
 }
 
 /// Time stamps of the first and last scan that hit a voxel, in nanoseconds since the epoch of their source.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct TimeSpan {
+    /// The first.
     pub first_ns: i64,
+    /// The last.
     pub last_ns: i64,
 }
 
