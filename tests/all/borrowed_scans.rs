@@ -3,7 +3,7 @@ use tempfile::TempDir;
 use testkit::random_scans::Random;
 use testkit::unsynced_disk::UnsyncedDisk;
 use voxtile::nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
-use voxtile::scan::{ScanReport, TakePoints};
+use voxtile::scan::{PointAttributes, ScanReport, TakePoints};
 use voxtile::sensor::{Iwlo, SensorModel};
 use voxtile::space::{Point, VoxelIndex};
 use voxtile::{
@@ -74,13 +74,8 @@ impl Measured {
     fn stored(&self) -> StoredScan {
         let (name, world_from_sensor) = (String::new(), self.world_from_sensor.into());
         let (points_in_sensor, intensities) = (self.widened(), self.intensities.clone());
-        let scan = SensorScan {
-            name,
-            points_in_sensor,
-            intensities,
-            attributes: Default::default(),
-            world_from_sensor,
-        };
+        let attributes = PointAttributes::default();
+        let scan = SensorScan { name, points_in_sensor, intensities, attributes, world_from_sensor };
         let mut bytes = Vec::new();
         let mut writer = ScanStreamWriter::new(&mut bytes, "", self.intensities.is_some()).unwrap();
         writer.write(&scan).unwrap();

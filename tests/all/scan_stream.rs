@@ -1,6 +1,6 @@
 use std::path::Path;
 use tempfile::TempDir;
-use voxtile::{Error, Pose, Scan};
+use voxtile::{Error, PointAttributes, Pose, Scan};
 use voxtile_formats::{ReadOptions, ScanSource, ScanStreamWriter, SensorScan, open_scans, read_scan_stream};
 use voxtile_simulation::Survey;
 
@@ -10,7 +10,7 @@ fn sensor_scan(number: u32) -> SensorScan {
         name: number.to_string(),
         points_in_sensor: (0..number).map(point).collect(),
         intensities: Some((0..number).map(|k| k as f32).collect()),
-        attributes: Default::default(),
+        attributes: PointAttributes::default(),
         world_from_sensor: Pose::from_quaternion([6_378_137.0, -2.0, 0.1], [0.5, -0.5, 0.5, 0.5]).unwrap(),
     }
 }

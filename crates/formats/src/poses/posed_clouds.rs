@@ -3,7 +3,7 @@ use super::{Found, Trajectory};
 use crate::scans::Fingerprint;
 use crate::scans::PointStore;
 use crate::scans::{ScanHead, ScanSource};
-use crate::{CloudHead, CloudPoint, CloudSource, Deskew, PoseAt, RigidPose};
+use crate::{CloudHead, CloudSource, Deskew, PoseAt, RigidPose};
 use std::cell::RefCell;
 use std::path::{Path, PathBuf};
 use voxtile::scan::{Pose, no_return};
@@ -248,27 +248,28 @@ impl PosedClouds {
             Deskew::new(stamp_ns, &sensor, pose_at)
         });
         points.begin_with(head.has_intensities, head.attributes);
+        let has_attributes = !head.attributes.is_none();
         let origin = if is_in_world { sensor.position_m } else { [0.0; 3] };
         let read = source.read_points(&mut |point| {
-            let CloudPoint { position_m, intensity, is_return, colour, class, .. } = point;
-            let place = match is_return {
-                true => deskew.as_mut().map_or(position_m, |deskew| deskew.apply(&point)),
-                false if options.has_no_returns => {
-                    // A point without a return is kept if its direction is known.
-                    let direction = std::array::from_fn(|k| position_m[k] - origin[k]);
-                    let far = position_m
-                        .iter()
-                        .all(|c| c.is_finite())
-                        .then(|| no_return([0.0; 3], direction))
-                        .flatten();
-                    return points.push_with(far.unwrap_or([f64::NAN; 3]), intensity, colour, class);
-                }
-                // Move the point to the sensor position, so that it is dropped later.
-                false => origin,
+            let position_m = point.position_m;
+            let in_sensor: Point = if point.is_return || !options.has_no_returns {
+                let place = match point.is_return {
+                    true => deskew.as_mut().map_or(position_m, |deskew| deskew.apply(&point)),
+                    // Move the point to the sensor position, so that it is dropped later.
+                    false => origin,
+                };
+                if is_in_world { std::array::from_fn(|k| place[k] - origin[k]) } else { place }
+            } else {
+                // A point without a return is kept if its direction is known.
+                let direction = std::array::from_fn(|k| position_m[k] - origin[k]);
+                let is_known = position_m.iter().all(|coordinate| coordinate.is_finite());
+                let far = is_known.then(|| no_return([0.0; 3], direction)).flatten();
+                far.unwrap_or([f64::NAN; 3])
             };
-            let in_sensor: Point = std::array::from_fn(|k| place[k] - origin[k]);
-            let in_sensor = if is_in_world { in_sensor } else { place };
-            points.push_with(in_sensor, intensity, colour, class)
+            if has_attributes {
+                return points.push_with(in_sensor, point.intensity, point.colour, point.class);
+            }
+            points.push(in_sensor, point.intensity)
         });
         self.stayed += deskew.map_or(0, |deskew| deskew.stayed());
         read?;

@@ -52,8 +52,22 @@ impl AttributeColumns {
         AttributeSet { colours: self.colour.is_some(), classes: self.class.is_some() }
     }
 
-    /// Sets the attributes of a point. `value` returns the value of a column, and `bits` that of a packed colour.
+    /// Sets the attributes of a point, if there are any. `value` returns the value of a column, and `bits` that of a
+    /// packed colour.
+    #[inline]
     pub(crate) fn set_in(
+        &self,
+        point: &mut CloudPoint,
+        values: &mut AttributeValues,
+        value: impl Fn(usize) -> f64,
+        bits: impl Fn(usize) -> Option<u32>,
+    ) {
+        if self.colour.is_some() || self.class.is_some() {
+            self.set_all(point, values, value, bits);
+        }
+    }
+
+    fn set_all(
         &self,
         point: &mut CloudPoint,
         values: &mut AttributeValues,

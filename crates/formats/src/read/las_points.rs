@@ -73,6 +73,8 @@ struct Fields {
     colours: LasColours,
     classes: ClassSelection,
     returns: Returns,
+    /// Whether not all points are selected.
+    selects: bool,
     /// Attributes to read.
     attributes: AttributeSet,
 }
@@ -114,6 +116,7 @@ impl LasPoints {
                 colours: LasColours::None,
                 classes: options.classes.clone(),
                 returns: options.returns,
+                selects: !options.classes.is_everything() || options.returns != Returns::All,
                 attributes: options.attributes_to_read(),
             },
             record_bytes: layout.record_bytes.max(1) as usize,
@@ -230,13 +233,15 @@ impl Fields {
             return Err(Skipped::Withheld);
         }
         let class = if self.format.is_extended { byte(16) } else { byte(15) & 0b1_1111 };
-        if !self.classes.takes(Some(class)) {
-            return Err(Skipped::ByClass);
-        }
-        let bits = if self.format.is_extended { 4 } else { 3 };
-        let mask = (1 << bits) - 1;
-        if !self.returns.takes(byte(14) & mask, (byte(14) >> bits) & mask) {
-            return Err(Skipped::ByReturn);
+        if self.selects {
+            let bits = if self.format.is_extended { 4 } else { 3 };
+            let mask = (1 << bits) - 1;
+            if !self.classes.takes(Some(class)) {
+                return Err(Skipped::ByClass);
+            }
+            if !self.returns.takes(byte(14) & mask, (byte(14) >> bits) & mask) {
+                return Err(Skipped::ByReturn);
+            }
         }
         let colour = match (self.colours, self.format.colour_at) {
             (colours, _) if !colours.are_there() => [0; 3],

@@ -141,7 +141,17 @@ impl PointStore {
     /// A file cannot be written.
     #[inline]
     pub fn push(&mut self, point: Point, intensity: f32) -> Result<()> {
-        self.push_with(point, intensity, None, None)
+        if !self.attribute_set.is_none() {
+            return self.push_with(point, intensity, None, None);
+        }
+        if self.points.len() == self.max_points {
+            self.put_in_file()?;
+        }
+        self.points.push(point);
+        if let Some(intensities) = &mut self.intensities {
+            intensities.push(intensity);
+        }
+        Ok(())
     }
 
     /// Adds a point with its attributes. Values that the scan does not have are ignored.
@@ -149,7 +159,6 @@ impl PointStore {
     /// # Errors
     ///
     /// A file cannot be written.
-    #[inline]
     pub fn push_with(
         &mut self,
         point: Point,

@@ -1,10 +1,14 @@
 use crate::attributes::{BOTH, Row, options, scanned};
 use crate::made::las::{Las, Packing};
+use crate::support::shared_data;
 use std::fs;
 use voxtile_formats::{ClassSelection, ReadOptions, Returns};
 
 /// Enough points for several chunks, and for many records beyond a tiny budget.
 const POINTS: usize = 20_000;
+
+/// Larger files take too long for a test.
+const MAX_POINTS: u64 = 400_000;
 
 fn colour(k: usize) -> [u16; 3] {
     [k as u16 | 0x100, (k as u16).wrapping_mul(77), 60_000]
@@ -151,4 +155,37 @@ fn las_points_are_selected_by_class_and_return() {
             }
         }
     }
+}
+
+/// Real files, compared with the crate `las`.
+#[test]
+fn real_files_have_the_attributes_that_another_reader_finds() {
+    let Some(folder) = shared_data("las_large_coords") else { return };
+    let (mut files, mut coloured) = (0, 0);
+    for entry in fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        if !path.extension().is_some_and(|extension| extension == "las" || extension == "laz") {
+            continue;
+        }
+        let Ok(mut reader) = las::Reader::from_path(&path) else { continue };
+        let Ok(data) = reader.read_points(MAX_POINTS) else { continue };
+        let Ok(points) = data.points().collect::<Result<Vec<las::Point>, _>>() else { continue };
+        if points.len() as u64 == MAX_POINTS {
+            continue;
+        }
+        let color = |point: &las::Point| point.color.map(|color| [color.red, color.green, color.blue]);
+        let largest = points.iter().filter_map(color).flatten().max().unwrap_or(0);
+        let shift = if largest > 255 { 8 } else { 0 };
+        let wanted = points.iter().filter(|point| !point.is_withheld).map(|point| {
+            let colour = color(point).filter(|_| largest > 0);
+            let class = u8::from(point.classification);
+            (colour.map(|colour| colour.map(|value| (value >> shift) as u8)), Some(class))
+        });
+        let reading = ReadOptions { scan_period_s: 0.0, ..options(BOTH) };
+        let (found, _) = scanned(&path, &reading, 0).unwrap();
+        assert!(found.iter().map(|row| (row.1, row.2)).eq(wanted), "{}", path.display());
+        files += 1;
+        coloured += usize::from(largest > 0);
+    }
+    assert!(files > 2 && coloured > 0, "{files} {coloured}");
 }
