@@ -14,17 +14,23 @@ pub struct PointStore {
     /// The last points, or all of them if there is no file.
     points: Vec<Point>,
     intensities: Option<Vec<f32>>,
-    /// Attributes of the points in memory. Lists that the scan does not have are empty.
-    attributes: PointAttributes,
-    attribute_set: AttributeSet,
+    attributes: Box<StoredAttributes>,
     /// Number of points in the file, which precede those in memory.
     filed: usize,
     file: Option<ScratchFile>,
     budget: PointBudget,
-    /// Maximum number of points in memory, from the budget.
-    max_points: usize,
     /// Marks of moving points, if the source has any.
     moving: Option<Box<MovingMarks>>,
+}
+
+/// Attributes of the points in memory. They are in a box, because most scans have none.
+#[derive(Debug)]
+struct StoredAttributes {
+    set: AttributeSet,
+    /// Lists that the scan does not have are empty.
+    lists: PointAttributes,
+    /// Maximum number of points in memory, from the budget and the size of a point with its attributes.
+    max_points: usize,
 }
 
 /// Memory limit for the points of a scan, and the folder for the others.
@@ -50,7 +56,7 @@ const POINTS_PER_CHUNK: usize = 1 << 18;
 impl Default for PointStore {
     /// All points stay in memory.
     fn default() -> Self {
-        Self::empty()
+        Self::new(PointBudget::default())
     }
 }
 
@@ -86,14 +92,10 @@ impl PointBudget {
 impl PointStore {
     /// Creates an empty store.
     pub fn new(budget: PointBudget) -> Self {
-        Self { max_points: budget.max_points(RECORD_BYTES), budget, ..Self::empty() }
-    }
-
-    fn empty() -> Self {
-        let (points, intensities, attributes, attribute_set) = Default::default();
-        let (filed, file, moving, budget) = Default::default();
-        let max_points = usize::MAX;
-        Self { points, intensities, attributes, attribute_set, filed, file, budget, max_points, moving }
+        let (set, lists) = Default::default();
+        let attributes = StoredAttributes { set, lists, max_points: budget.max_points(RECORD_BYTES) };
+        let (points, intensities, filed, file, moving) = Default::default();
+        Self { points, intensities, attributes: Box::new(attributes), filed, file, budget, moving }
     }
 
     /// Removes all points and sets whether the next ones have intensities. They have no attributes.
@@ -105,9 +107,9 @@ impl PointStore {
     pub fn begin_with(&mut self, has_intensities: bool, attributes: AttributeSet) {
         self.points.clear();
         self.intensities = has_intensities.then(Vec::new);
-        self.attributes.clear();
-        self.attribute_set = attributes;
-        self.max_points = self.budget.max_points(self.record_bytes());
+        self.attributes.lists.clear();
+        self.attributes.set = attributes;
+        self.attributes.max_points = self.budget.max_points(self.record_bytes());
         (self.filed, self.file, self.moving) = (0, None, None);
     }
 
@@ -127,7 +129,7 @@ impl PointStore {
 
     /// Reserves memory for points, up to the limit.
     pub(crate) fn reserve(&mut self, points: usize) {
-        let points = points.min(self.max_points);
+        let points = points.min(self.attributes.max_points);
         self.points.reserve_exact(points);
         if let Some(intensities) = &mut self.intensities {
             intensities.reserve_exact(points);
@@ -141,10 +143,10 @@ impl PointStore {
     /// A file cannot be written.
     #[inline]
     pub fn push(&mut self, point: Point, intensity: f32) -> Result<()> {
-        if !self.attribute_set.is_none() {
+        if !self.attributes.set.is_none() {
             return self.push_with(point, intensity, None, None);
         }
-        if self.points.len() == self.max_points {
+        if self.points.len() == self.attributes.max_points {
             self.put_in_file()?;
         }
         self.points.push(point);
@@ -166,18 +168,18 @@ impl PointStore {
         colour: Option<[u8; 3]>,
         class: Option<u8>,
     ) -> Result<()> {
-        if self.points.len() == self.max_points {
+        if self.points.len() == self.attributes.max_points {
             self.put_in_file()?;
         }
         self.points.push(point);
         if let Some(intensities) = &mut self.intensities {
             intensities.push(intensity);
         }
-        if self.attribute_set.colours {
-            self.attributes.colours.push(colour);
+        if self.attributes.set.colours {
+            self.attributes.lists.colours.push(colour);
         }
-        if self.attribute_set.classes {
-            self.attributes.classes.push(class);
+        if self.attributes.set.classes {
+            self.attributes.lists.classes.push(class);
         }
         Ok(())
     }
@@ -191,8 +193,8 @@ impl PointStore {
         &mut self,
         mut points: impl ExactSizeIterator<Item = (Point, f32)> + Clone,
     ) -> Result<()> {
-        let is_beyond = points.len() > self.max_points.saturating_sub(self.points.len());
-        if is_beyond || !self.attribute_set.is_none() {
+        let is_beyond = points.len() > self.attributes.max_points.saturating_sub(self.points.len());
+        if is_beyond || !self.attributes.set.is_none() {
             return points.try_for_each(|(point, intensity)| self.push(point, intensity));
         }
         self.points.extend(points.clone().map(|(point, _)| point));
@@ -218,11 +220,11 @@ impl PointStore {
                 let intensity = self.intensities.as_ref().map_or(0.0, |intensities| intensities[number]);
                 bytes.extend_from_slice(bytemuck::bytes_of(point));
                 bytes.extend_from_slice(bytemuck::bytes_of(&intensity));
-                if let Some(colour) = self.attributes.colours.get(number) {
+                if let Some(colour) = self.attributes.lists.colours.get(number) {
                     let [red, green, blue] = colour.unwrap_or_default();
                     bytes.extend([u8::from(colour.is_some()), red, green, blue]);
                 }
-                if let Some(class) = self.attributes.classes.get(number) {
+                if let Some(class) = self.attributes.lists.classes.get(number) {
                     bytes.extend([u8::from(class.is_some()), class.unwrap_or_default()]);
                 }
             }
@@ -233,14 +235,14 @@ impl PointStore {
         if let Some(intensities) = &mut self.intensities {
             intensities.clear();
         }
-        self.attributes.clear();
+        self.attributes.lists.clear();
         self.file = Some(file);
         Ok(())
     }
 
     /// Returns the size of a point in the file.
     fn record_bytes(&self) -> usize {
-        let AttributeSet { colours, classes } = self.attribute_set;
+        let AttributeSet { colours, classes } = self.attributes.set;
         RECORD_BYTES + COLOUR_BYTES * usize::from(colours) + CLASS_BYTES * usize::from(classes)
     }
 
@@ -261,7 +263,7 @@ impl PointStore {
 
     /// Returns which attributes the points have.
     pub fn attributes(&self) -> AttributeSet {
-        self.attribute_set
+        self.attributes.set
     }
 
     /// Passes the points of a range to `take` in order, chunk by chunk, with their intensities if there are any. `take`
@@ -290,7 +292,7 @@ impl PointStore {
         let mut chunk = FileChunk::default();
         while next < in_file.end {
             let count = (in_file.end - next).min(POINTS_AT_A_TIME);
-            chunk.decode(&self.window(next, count)?, self.record_bytes(), self.attribute_set);
+            chunk.decode(&self.window(next, count)?, self.record_bytes(), self.attributes.set);
             let intensities = self.has_intensities().then_some(&*chunk.intensities);
             if !take(&chunk.points, intensities, chunk.attributes.part(0..count)) {
                 return Ok(());
@@ -300,7 +302,7 @@ impl PointStore {
         for first in in_memory.clone().step_by(POINTS_PER_CHUNK) {
             let some = first..in_memory.end.min(first + POINTS_PER_CHUNK);
             let intensities = self.intensities.as_ref().map(|intensities| &intensities[some.clone()]);
-            if !take(&self.points[some.clone()], intensities, self.attributes.part(some)) {
+            if !take(&self.points[some.clone()], intensities, self.attributes.lists.part(some)) {
                 return Ok(());
             }
         }
@@ -321,7 +323,7 @@ impl PointStore {
 
     /// Returns points, intensities and attributes, if all are in memory.
     pub(crate) fn into_parts(self) -> (Vec<Point>, Option<Vec<f32>>, PointAttributes) {
-        (self.points, self.intensities, self.attributes)
+        (self.points, self.intensities, self.attributes.lists)
     }
 }
 
@@ -376,7 +378,7 @@ mod tests {
                         .map(point)
                         .for_each(|(point, intensity)| store.push(point, intensity).unwrap()),
                 }
-                assert!(store.points.len() <= store.max_points);
+                assert!(store.points.len() <= store.attributes.max_points);
             }
             assert_eq!((store.len(), store.file.is_some()), (count, max_bytes < usize::MAX));
             for range in
