@@ -3,6 +3,7 @@ use crate::build_options::BuildOptions;
 use crate::failed_flush::FailedFlush;
 use crate::flush_schedule::FlushSchedule;
 use crate::ingest::{Ingest, Next, RayNeeds, Taken};
+use crate::layer_check::LayerCheck;
 use crate::pose_check::{Doubt, PoseCheck, check_ahead};
 use crate::scan_input::{ScanInput, ScanInputs, is_standard_input};
 use crate::scan_queue::{ScanQueue, WhenBehind};
@@ -149,6 +150,7 @@ fn build_input(
     }
     let gauge = watch.over_scans(input.scans.map(|scans| scans + scans_before as usize));
     gauge.pass(scans_before + ingest.content().scans);
+    let layer_check = LayerCheck::new(mapper.config().layers());
     let mut build = Build {
         mapper,
         ingest,
@@ -162,17 +164,19 @@ fn build_input(
         pose_check,
         doubt: None,
         is_strict: options.strict,
+        layer_check,
     };
     let outcome = build.insert_all();
     build.gauge.say("flushing");
     // Accepted scans are flushed, however the build ended.
     let flushed = build.mapper.flush();
-    let Build { report, scans, mut ingest, gauge, doubt, .. } = build;
+    let Build { report, scans, mut ingest, gauge, doubt, layer_check, .. } = build;
     drop(gauge);
     let mut remarks = ingest.remarks();
     remarks.iter_mut().for_each(|remark| *remark = format!("{scans}: {remark}"));
     remarks.extend(doubt.map(|doubt| doubt.remark()));
     remarks.extend(all_rays_cut(&report, mapper.config()));
+    remarks.extend(layer_check.remarks());
     remarks.iter().for_each(|remark| log::warn!("{remark}"));
     if let Err(flush_error) = flushed {
         let (config, scan_number) = (mapper.config().clone(), mapper.flushed_scan_number());
@@ -211,6 +215,7 @@ struct Build<'a> {
     pose_check: Option<PoseCheck>,
     doubt: Option<Doubt>,
     is_strict: bool,
+    layer_check: LayerCheck,
 }
 
 impl Build<'_> {
@@ -234,6 +239,7 @@ impl Build<'_> {
             };
             for Taken { scan, .. } in &taken {
                 self.check_poses(|check| check.take(scan))?;
+                self.layer_check.note(scan)?;
             }
             let mut reports = Vec::with_capacity(taken.len());
             let inserted = self.insert(&taken, &mut reports);

@@ -27,6 +27,7 @@ mod flush_schedule;
 mod ingest;
 mod input_chain;
 mod kept_source;
+mod layer_check;
 mod map_at;
 pub mod memory;
 mod moving_points;

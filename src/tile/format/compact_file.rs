@@ -73,7 +73,6 @@ pub fn read_compact_voxels_from(
 }
 
 /// Reads front part and table; also returns the number of bytes that follow.
-
 fn read_after_front<T>(
     input: &mut impl Read,
     file_bytes: u64,
