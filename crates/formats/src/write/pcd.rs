@@ -31,7 +31,10 @@ impl<'a> PcdSink<'a> {
             [(layers.colour, " rgb", " 4", " F"), (layers.class, " label", " 4", " U")]
         {
             if is_there {
-                (names += name, sizes += size, types += kind, counts += " 1");
+                names += name;
+                sizes += size;
+                types += kind;
+                counts += " 1";
             }
         }
         let text = format!(
