@@ -324,6 +324,7 @@ impl Map {
     /// masked are skipped and counted. `colours` (N x 3, 0 to 255) and `classes` (N, 0 to 255) are for the layers of the
     /// map; NaN, and a class below 0, mean that a point has none. After an error the map is unchanged.
     #[pyo3(signature = (points, pose=None, *, origin=None, intensities=None, colours=None, classes=None))]
+    #[expect(clippy::too_many_arguments, reason = "keywords, in Python")]
     fn insert<'py>(
         &self,
         py: Python<'py>,
