@@ -35,7 +35,7 @@ maps_and_exports() {
     inside "$1" demo --out /tmp/demo --length 20
     inside "$1" verify /tmp/demo/map_tiles
     inside "$1" export /tmp/demo/map_tiles -o /tmp/demo/map.laz
-    inside "$1" scans /release/recording
+    inside "$1" scans /release/recording --topic /points
     inside rm -r /tmp/demo
 }
 
