@@ -45,10 +45,11 @@ def test_layers_are_sums_over_the_points_of_a_voxel(tmp_path: Path) -> None:
             if inside.sum() > 1:
                 covariance = np.cov(points[inside].T)
                 expected = covariance[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
-                assert np.allclose(found["covariance"][number], expected, atol=1e-4)
+                # Offsets are stored in steps of a 1024th of a voxel.
+                assert np.allclose(found["covariance"][number], expected, atol=1e-3)
         nothing = city.layers_at([[100.0, 0.0, 0.0]])
         assert nothing["points"][0] == 0 and np.isnan(nothing["colour"]).all() and nothing["class"][0] == -1
-    with voxtile.open(tmp_path / "map", "r") as again:
+    with voxtile.open(tmp_path / "map") as again:
         assert again.layers == ["colour", "intensity", "class", "shape"] and again.layer_digest() == digest
 
 
@@ -71,6 +72,6 @@ def test_a_build_reads_colours_and_selects_classes(tmp_path: Path) -> None:
         "property uchar red\nproperty uchar green\nproperty uchar blue\nproperty uchar class\nend_header\n" + rows
     )
     files.build(tmp_path / "scan.ply", tmp_path / "map", poses="identity", layers="colour,class", skip_class=[7])
-    with voxtile.open(tmp_path / "map", "r") as city:
+    with voxtile.open(tmp_path / "map") as city:
         found = city.layers_at([[3.0, 0.0, 0.5], [7.0, 0.0, 0.5]])
         assert found["colour"][0].tolist() == [30.0, 0.0, 3.0] and found["class"].tolist() == [3, -1]
