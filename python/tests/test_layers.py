@@ -57,9 +57,14 @@ def test_wrong_attributes_and_layers_are_refused(tmp_path: Path) -> None:
     with pytest.raises(errors.ArgumentError, match="rgb"):
         voxtile.Map.create(tmp_path / "wrong", layers="rgb")
     with voxtile.Map.create(tmp_path / "map", layers=["colour", "class"]) as city:
-        for wrong in ({"colours": [[1, 2, 3]]}, {"colours": [[1, 2, 300]] * 2}, {"classes": [1, 256]}, {"classes": [1.5, 2]}):
+        for wrong in (
+            {"colours": [[1, 2, 3]]},
+            {"colours": [[1, 2, 300]] * 2},
+            {"classes": [1, 256]},
+            {"classes": [1.5, 2]},
+        ):
             with pytest.raises(errors.ArgumentError):
-                city.insert([[1.0, 0, 0], [2.0, 0, 0]], origin=[0, 0, 0], **wrong)  # type: ignore[arg-type]
+                city.insert([[1.0, 0, 0], [2.0, 0, 0]], origin=[0, 0, 0], **wrong)
         assert city.scan_number == 0
     with voxtile.Map.create(tmp_path / "plain") as plain:
         assert plain.layers == [] and list(plain.layers_at([[0.0, 0, 0]])) == ["points"]
