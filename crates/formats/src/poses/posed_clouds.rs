@@ -255,7 +255,7 @@ impl PosedClouds {
             let in_sensor: Point = if point.is_return || !options.has_no_returns {
                 let place = match point.is_return {
                     true => deskew.as_mut().map_or(position_m, |deskew| deskew.apply(&point)),
-                    // Move the point to the sensor position, so that it is dropped later.
+                    // Points at the position of the sensor are skipped when they are mapped.
                     false => origin,
                 };
                 if is_in_world { std::array::from_fn(|k| place[k] - origin[k]) } else { place }

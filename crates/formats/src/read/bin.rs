@@ -124,7 +124,7 @@ pub(crate) fn open(
     let wanted = options.attributes_to_read();
     let attributes = AttributeColumns::of(columns.names.iter().map(String::as_str), wanted, |_| false);
     let labels = match wanted.classes && attributes.class.is_none() {
-        true => LabelFile::beside(path, bytes / point_bytes)?,
+        true => LabelFile::open_for(path, bytes / point_bytes)?,
         false => None,
     };
     head.attributes = attributes.set();

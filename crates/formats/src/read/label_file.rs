@@ -20,7 +20,7 @@ impl LabelFile {
     /// # Errors
     ///
     /// The label file cannot be read, or has another number of points.
-    pub(super) fn beside(points_path: &Path, points: u64) -> Result<Option<Self>> {
+    pub(super) fn open_for(points_path: &Path, points: u64) -> Result<Option<Self>> {
         let Some(name) = points_path.file_stem() else { return Ok(None) };
         let folder = points_path.parent().filter(|folder| !folder.as_os_str().is_empty());
         let folder = folder.unwrap_or(Path::new(".")).join("..").join("labels");
