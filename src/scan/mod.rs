@@ -35,7 +35,7 @@ mod world_scan;
 
 #[doc(hidden)]
 pub use codec::PointBlocks;
-pub(crate) use codec::{MAX_BLOCK_BYTES, PointDecoder};
+pub(crate) use codec::{MAX_BLOCK_BYTES, PointDecoder, unzigzag, zigzag};
 pub use coordinate::Coordinate;
 pub(crate) use moving_marks::ChunkMarks;
 pub use moving_marks::{MovingMarks, MovingMarksBuilder};

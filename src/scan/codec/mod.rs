@@ -22,6 +22,7 @@ mod words;
 pub use point_blocks::PointBlocks;
 pub(crate) use point_decoder::PointDecoder;
 use point_encoder::PointEncoder;
+pub(crate) use words::{unzigzag, zigzag};
 
 use crate::space::Point;
 

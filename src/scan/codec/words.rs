@@ -109,12 +109,14 @@ pub(super) fn widen(bits: u32) -> f64 {
     f64::from_bits(sign | 0x7ff0_0000_0000_0000 | u64::from(bits & 0x007f_ffff) << MORE_BITS)
 }
 
+/// Stores the sign in the lowest bit: 0, -1, 1, -2 become 0, 1, 2, 3.
 #[inline]
-pub(super) fn zigzag(number: i64) -> u64 {
+pub(crate) fn zigzag(number: i64) -> u64 {
     ((number << 1) ^ (number >> 63)) as u64
 }
 
+/// Inverse of [`zigzag`].
 #[inline]
-pub(super) fn unzigzag(number: u64) -> i64 {
+pub(crate) fn unzigzag(number: u64) -> i64 {
     (number >> 1) as i64 ^ -((number & 1) as i64)
 }

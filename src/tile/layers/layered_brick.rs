@@ -1,11 +1,10 @@
 use super::packed_rows::PackedRows;
 use super::row::{
     CLASS, INTENSITY, OFFSETS, OUTVOTED, POINTS, PRODUCTS, RED, Row, SQUARES, UNCOLOURED, UNMEASURED,
-    unzigzag, zigzag,
 };
 use super::voxel_layers::{ClassVotes, TimeSpan, VoxelLayers};
 use crate::config::Layers;
-use crate::scan::LayerHit;
+use crate::scan::{LayerHit, unzigzag, zigzag};
 use crate::space::{BrickMask, add_to_mask, is_in_mask, places};
 
 /// Layers of the hit voxels of a brick.
@@ -52,7 +51,8 @@ impl LayeredBrick {
         if layers.time {
             let base_ns = self.note_base(stamp_ns);
             let before = row.time(base_ns).filter(|_| number.is_some());
-            row.set_time(base_ns, joined(before, stamp_ns.map(|ns| TimeSpan { first_ns: ns, last_ns: ns })));
+            let now = stamp_ns.map(|ns| TimeSpan { first_ns: ns, last_ns: ns });
+            row.set_time(base_ns, TimeSpan::joined(before, now));
         }
         match number {
             Some(number) => self.rows.set(number, &row),
@@ -171,13 +171,4 @@ fn rank(mask: &BrickMask, place: usize) -> usize {
     let (word, bit) = (place / 64, place % 64);
     let before: u32 = mask[..word].iter().map(|word| word.count_ones()).sum();
     (before + (mask[word] & ((1 << bit) - 1)).count_ones()) as usize
-}
-
-fn joined(a: Option<TimeSpan>, b: Option<TimeSpan>) -> Option<TimeSpan> {
-    match (a, b) {
-        (Some(a), Some(b)) => {
-            Some(TimeSpan { first_ns: a.first_ns.min(b.first_ns), last_ns: a.last_ns.max(b.last_ns) })
-        }
-        (a, b) => a.or(b),
-    }
 }

@@ -1,5 +1,6 @@
 use super::voxel_layers::{ClassVotes, ColourSums, IntensitySums, ShapeSums, TimeSpan, VoxelLayers};
 use crate::config::Layers;
+use crate::scan::{unzigzag, zigzag};
 
 /// Maximum number of points of a voxel in a file: sums of so many points have at most 63 bits.
 const MAX_POINTS: u64 = 1 << 31;
@@ -34,17 +35,6 @@ pub(super) const SPAN: usize = 12;
 pub(super) const OFFSETS: usize = 13;
 /// Three sums of squares, then three sums of products as zigzag.
 pub(super) const PRODUCTS: usize = 16;
-
-/// Stores the sign in the lowest bit.
-#[inline]
-pub(super) fn zigzag(number: i64) -> u64 {
-    ((number << 1) ^ (number >> 63)) as u64
-}
-
-#[inline]
-pub(super) fn unzigzag(number: u64) -> i64 {
-    (number >> 1) as i64 ^ -((number & 1) as i64)
-}
 
 impl Row {
     /// The time span; `base_ns` is that of the brick.

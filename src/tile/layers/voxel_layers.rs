@@ -72,6 +72,18 @@ pub struct ShapeSums {
     pub products: [i64; 6],
 }
 
+impl TimeSpan {
+    /// The span that covers both.
+    pub(super) fn joined(a: Option<Self>, b: Option<Self>) -> Option<Self> {
+        match (a, b) {
+            (Some(a), Some(b)) => {
+                Some(Self { first_ns: a.first_ns.min(b.first_ns), last_ns: a.last_ns.max(b.last_ns) })
+            }
+            (a, b) => a.or(b),
+        }
+    }
+}
+
 impl VoxelLayers {
     /// Mean colour, rounded; `None` if no point had a colour.
     pub fn mean_colour(&self) -> Option<[u8; 3]> {
@@ -145,12 +157,7 @@ impl VoxelLayers {
                 Err(at) => self.classes.insert(at, ClassVotes { class, votes }),
             }
         }
-        self.time = match (self.time, other.time) {
-            (Some(a), Some(b)) => {
-                Some(TimeSpan { first_ns: a.first_ns.min(b.first_ns), last_ns: a.last_ns.max(b.last_ns) })
-            }
-            (a, b) => a.or(b),
-        };
+        self.time = TimeSpan::joined(self.time, other.time);
         let add = |sum: &mut i64, more: i64| *sum = sum.saturating_add(more);
         (0..3).for_each(|k| add(&mut self.shape.offsets[k], other.shape.offsets[k]));
         (0..6).for_each(|k| add(&mut self.shape.products[k], other.shape.products[k]));
