@@ -124,7 +124,12 @@ pub fn read_layer_section(
     }
     let crc = u32_at(16).to_le_bytes();
     let input = Input::new(input.take(length).chain(&crc[..]), length + CRC_BYTES);
-    read_payload(input, tile).map_err(|error| error.further_by(HEADER_BYTES as u64))
+    read_payload(input, tile).map_err(|error| match error.further_by(HEADER_BYTES as u64) {
+        DecodeError::Format(FormatError { at, reason, .. }) => {
+            FormatError::at_offset(at, format!("the layers are damaged: {reason}")).into()
+        }
+        error => error,
+    })
 }
 
 fn read_payload(mut input: Input<impl Read>, tile: &VoxelBox) -> Result<LayerTable, DecodeError> {
@@ -149,7 +154,8 @@ fn read_payload(mut input: Input<impl Read>, tile: &VoxelBox) -> Result<LayerTab
     let mut integers: [Vec<u8>; COLUMNS] = Default::default();
     for bytes in &mut integers {
         let max_bytes = voxels * MAX_NUMBER_BYTES;
-        reader.take_columns([Column { name: "integers of layers", max_bytes, bytes }], &mut input)?;
+        reader
+            .take_columns([Column { name: "size of a column of integers", max_bytes, bytes }], &mut input)?;
     }
     let mut others = Vec::new();
     // A voxel has at most 256 classes: two numbers and a byte each.
