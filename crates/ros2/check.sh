@@ -5,7 +5,9 @@
 # or PyPI is missing. The test `rclpy` uses ROS 2 itself: rclpy of Jazzy over Fast DDS, from PyPI (for Python 3.11).
 #
 # check.sh [friendly] [hostile] [types] [variants] [odometry] [launch] [path] [real] [sensors] [flood] [monitoring]
-#          [rclpy] [zenoh]
+#          [rclpy] [zenoh] [sizes]
+#
+# sizes, only when named, prints how long clients of each middleware wait for messages of up to 50 MB.
 #
 # VOXTILE_ROS2_PYTHON is a Python with the packages, VOXTILE_ZENOH_PYTHON one with eclipse-zenoh as well,
 # VOXTILE_RCLPY_PYTHON one with rclpy as well. VOXTILE and VOXTILE_ROS2 are built programs, VOXTILE_ROS2_ZENOH is the
@@ -194,11 +196,43 @@ zenoh() {
     crates/ros2/tests/zenoh.sh "$work"
 }
 
+# Prints the waiting times for messages of several sizes, with the buffers of sockets that this machine has.
+sizes() {
+    local script=$PWD/crates/ros2/tests/message_sizes.py middleware radius port router client options
+    "$python" "$script" scan "$work/half.ply"
+    "$voxtile" build "$work/half.ply" -o "$map" --poses identity --resolution 0.1 --max-range 40 --quiet
+    echo "sizes: net.core.rmem_default $(cat /proc/sys/net/core/rmem_default), rmem_max $(cat /proc/sys/net/core/rmem_max)"
+    for middleware in cyclonedds fastdds zenoh; do
+        options=() client=$python router=
+        port=$((RANDOM % 10000 + 20000))
+        case $middleware in
+        cyclonedds) options=(--rmw cyclonedds) ;;
+        fastdds)
+            client=${VOXTILE_RCLPY_PYTHON:-}
+            [ -n "$client" ] || { echo "fastdds: skipped; set VOXTILE_RCLPY_PYTHON" && continue; }
+            ;;
+        zenoh)
+            options=(--transport zenoh --zenoh-router tcp/127.0.0.1:$port)
+            (cd crates/ros2/tests && exec "$python" zenoh_router.py $port) >/dev/null 2>&1 &
+            router=$!
+            ;;
+        esac
+        for radius in 1 2.5 4 6 10; do
+            domain=$((RANDOM % 100 + 100))
+            start --publish-radius $radius --publish-every 0.2 "${options[@]}"
+            sleep 3
+            "$client" "$script" $middleware $domain $port | sed "s/^/$middleware /"
+            end INT
+        done
+        if [ -n "$router" ]; then kill $router; fi
+    done
+}
+
 # Folder of real clouds, if available.
 street=${VOXTILE_DATA:-../shared/data}/mulran_riverside02_a
 for kind in ${*:-friendly hostile types variants odometry launch path real sensors flood monitoring rclpy zenoh}; do
     map=$work/$kind count=30 resolution=0.1 seconds=12
-    if [ $kind = zenoh ] || [ $kind = rclpy ]; then
+    if [ $kind = zenoh ] || [ $kind = rclpy ] || [ $kind = sizes ]; then
         $kind
         continue
     fi
