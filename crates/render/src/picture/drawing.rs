@@ -8,6 +8,7 @@ use super::legend::{Entry, Legend, Scale, legend_height, moving_entry};
 use super::moving::Moving;
 use super::options::Picture;
 use super::palette::{self, Rgb, color_of, lit, mixed};
+use super::time_labels::short_time_labels;
 use super::view::{Change, ColorBy};
 use crate::Layer;
 use crate::classes::{class_color, class_label};
@@ -224,14 +225,20 @@ impl<'a> Drawing<'a> {
 
     /// Returns the entries of the legend.
     fn entries(&self, classes: &[(u8, u64)], cells_without_value: u64) -> Vec<Entry> {
-        let class = |&(class, _): &(u8, u64)| Entry { color: class_color(class), label: class_label(class) };
+        let class =
+            |&(class, _): &(u8, u64)| Entry { color: Some(class_color(class)), label: class_label(class) };
         let mut entries: Vec<Entry> = classes.iter().map(class).collect();
         if let (ColorBy::Layer(layer), 1..) = (self.picture.color_by, cells_without_value) {
             let name = match layer {
                 Layer::Colour => "color",
                 layer => layer.name(),
             };
-            entries.push(Entry { color: palette::NO_VALUE, label: format!("no {name}") });
+            entries.push(Entry { color: Some(palette::NO_VALUE), label: format!("no {name}") });
+        }
+        if let (ColorBy::Layer(Layer::Time), Some(range)) = (self.picture.color_by, self.range)
+            && let (_, Some(date)) = short_time_labels(range)
+        {
+            entries.push(Entry { color: None, label: format!("last hit: {date} utc") });
         }
         entries.extend(self.moving.as_ref().map(|moving| moving_entry(moving.points)));
         entries

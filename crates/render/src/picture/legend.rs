@@ -2,7 +2,7 @@ use super::canvas::Canvas;
 use super::font;
 use super::palette::{self, Rgb, color_of};
 use super::scale::{length_label, round_length_m};
-use super::time_labels::time_labels;
+use super::time_labels::short_time_labels;
 use super::view::ColorBy;
 use crate::Layer;
 
@@ -20,9 +20,9 @@ pub struct Legend {
     pub entries: Vec<Entry>,
 }
 
-/// A color and its meaning.
+/// A color and its meaning, or a remark without a color.
 pub struct Entry {
-    pub color: Rgb,
+    pub color: Option<Rgb>,
     pub label: String,
 }
 
@@ -65,7 +65,7 @@ fn places_of(entries: &[Entry], width: usize, dot: usize) -> Vec<[usize; 2]> {
 
 /// Returns the entry of points on moving objects.
 pub fn moving_entry(points: u64) -> Entry {
-    Entry { color: palette::MOVING, label: format!("moving points: {}", grouped(points)) }
+    Entry { color: Some(palette::MOVING), label: format!("moving points: {}", grouped(points)) }
 }
 
 /// Space at both sides of the legend, in dots.
@@ -125,7 +125,11 @@ impl Legend {
             canvas.text(sensor + 11 * dot, top, dot, palette::FAINT_INK, "sensor");
         }
         for (entry, [left, row]) in self.entries.iter().zip(places_of(&self.entries, canvas.width(), dot)) {
-            draw_swatch(canvas, [left * dot, foot + row * dot], dot, entry.color, &entry.label);
+            let place = [left * dot, foot + row * dot];
+            match entry.color {
+                Some(color) => draw_swatch(canvas, place, dot, color, &entry.label),
+                None => canvas.text(place[0], place[1], dot, palette::FAINT_INK, &entry.label),
+            }
         }
     }
 
@@ -182,7 +186,11 @@ fn labels(color_by: ColorBy, [least, most]: [f64; 2]) -> (&'static str, [String;
         ColorBy::Count => ("count", [least, most].map(|value| format!("{value:.0}"))),
         ColorBy::LastScan => ("last scan", [least, most].map(|value| format!("{value:.0}"))),
         ColorBy::Distance => ("distance", [least, most].map(|value| format!("{value} m"))),
-        ColorBy::Layer(Layer::Time) => ("last hit", time_labels([least, most])),
+        ColorBy::Layer(Layer::Time) => match short_time_labels([least, most]) {
+            (labels, None) => ("last hit", labels),
+            // The rest of the dates is an entry with this name.
+            (labels, Some(_)) => ("", labels),
+        },
         ColorBy::Layer(layer) => (layer.name(), [least, most].map(|value| number_label(value, most - least))),
     }
 }
@@ -250,7 +258,7 @@ mod tests {
 
     #[test]
     fn entries_fill_rows() {
-        let entry = |label: &str| Entry { color: [0; 3], label: label.to_owned() };
+        let entry = |label: &str| Entry { color: Some([0; 3]), label: label.to_owned() };
         let entries = ["2 ground", "6 building", "5 high vegetation", "9 water"].map(entry);
         let places = places_of(&entries, 400, 2);
         assert_eq!((places[0], places[2][1]), ([MARGIN, FIRST_ROW], FIRST_ROW + ROW));

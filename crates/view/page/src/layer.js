@@ -17,8 +17,9 @@ const LAST_RETRY_MS = 60000;
 
 // One state of a map; nodes are loaded and removed as the camera moves.
 export class Layer {
-  constructor(viewer, map, id, hue) {
-    Object.assign(this, { viewer, map, id, hue });
+  // `legend` is that of the layer by which the voxels are coloured; none before it is loaded.
+  constructor(viewer, map, id, hue, legend) {
+    Object.assign(this, { viewer, map, id, hue, legend });
     this.group = new THREE.Group();
     this.near = new THREE.Group();
     this.group.add(this.near);
@@ -32,8 +33,6 @@ export class Layer {
     this.lostNear = new Set();
     this.retryMs = FIRST_RETRY_MS;
     this.generation = map.generation;
-    // Legend of the layer by which the voxels are coloured; none before it is loaded.
-    this.legend = null;
     this.tiles = this.open();
     this.next = null;
     this.isShown = true;

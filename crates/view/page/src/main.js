@@ -45,6 +45,8 @@ let answered = null;
 let legend = null;
 let legendNumber = 0;
 let legendShown = 0;
+// Number of the last choice of states to show.
+let shownNumber = 0;
 let path = [];
 let pathNumber = 0;
 // Marked points of the first map that were loaded last, and the number of the last request for them.
@@ -135,12 +137,19 @@ async function readExtents() {
   }));
 }
 
-function showMaps() {
+async function showMaps() {
+  const number = ++shownNumber;
+  const shown = maps.map((map) => ({ map, id: idOf(map) }));
+  viewer.colour = $('colour').value;
+  const found = BY_LAYER[viewer.colour] ? await legendOf(shown) : null;
+  // Another state was chosen in the meantime.
+  if (number !== shownNumber) return;
+  legend = found;
   viewer.scaled = false;
-  viewer.show(maps.map((map) => ({ map, id: idOf(map) })));
+  viewer.show(shown, legend);
   viewer.layers.forEach((layer, k) => { layer.isShown = $('layers').querySelectorAll('input')[k]?.checked ?? true; });
   paint();
-  loadLegend();
+  if (!legend) loadLegend();
   readPath();
   loadMoving();
   loadDistances();
@@ -280,28 +289,34 @@ const swatchOf = (colour) => {
   return swatch;
 };
 
-// Loads the legends of the chosen layer, of all maps that have it, and then their voxels in its colours, except of layers
-// that the caller refreshes.
+// Returns the joined legend of the chosen layer, of all maps that have it; `null` if it cannot be loaded.
+async function legendOf(shown) {
+  const name = BY_LAYER[$('colour').value];
+  const ids = shown.filter(({ map, id }) => map.layers?.includes(name) && !id.includes('~')).map(({ id }) => id);
+  try {
+    return joined(await Promise.all(ids.map(async (id) => (await json(`maps/${id}/layers.json`))[name])));
+  } catch (error) {
+    say(`Cannot load the legend: ${error.message}`);
+    return null;
+  }
+}
+
+// Loads the legend of the chosen layer, and then the voxels in its colours, except of layers that the caller refreshes.
 async function loadLegend(refreshed = []) {
   const number = ++legendNumber;
-  const name = BY_LAYER[$('colour').value];
-  legend = null;
-  if (!name) {
+  if (!BY_LAYER[$('colour').value]) {
+    legend = null;
     legendShown = number;
     return;
   }
-  const layers = viewer.layers.filter(({ layerName }) => layerName === name);
-  try {
-    const legends = await Promise.all(layers.map(async ({ id }) => (await json(`maps/${id}/layers.json`))[name]));
-    if (number !== legendNumber) return;
-    legend = joined(legends);
-  } catch (error) {
-    if (number !== legendNumber) return;
-    say(`Cannot load the legend: ${error.message}`);
+  const found = await legendOf(viewer.layers);
+  if (number !== legendNumber) return;
+  if (!found) {
     setTimeout(() => { if (number === legendNumber) loadLegend(); }, RETRY_MS);
     return;
   }
-  for (const layer of layers) {
+  legend = found;
+  for (const layer of viewer.layers) {
     if (refreshed.includes(layer)) layer.legend = legend;
     else layer.paintBy(legend);
   }

@@ -67,10 +67,10 @@ export class Viewer {
     return point.map((k, axis) => k - this.world.position.getComponent(axis));
   }
 
-  show(maps) {
+  show(maps, legend) {
     for (const layer of this.layers) layer.dispose();
     this.layers = maps.map(({ map, id }, k) => {
-      const layer = new Layer(this, map, id, maps.length > 1 ? LAYERS[k % LAYERS.length] : null);
+      const layer = new Layer(this, map, id, maps.length > 1 ? LAYERS[k % LAYERS.length] : null, legend);
       this.world.add(layer.group);
       return layer;
     });
