@@ -119,8 +119,8 @@ def test_a_plot_shows_times(tmp_path: Path) -> None:
     pytest.importorskip("matplotlib")
     scans = tmp_path / "scans"
     scans.mkdir()
-    for number in range(2):
-        (scans / f"{number}.xyz").write_text(f"{5.5 + number} 0.5 0.5\n")
+    for number, stamp in enumerate(["1317042272.000000", "1317042284.500000"]):
+        (scans / f"{stamp}.xyz").write_text(f"{5.5 + number} 0.5 0.5\n")
     (scans / "poses_tum.txt").write_text("1317042272 0 0 0 0 0 0 1\n1317042284.5 0 0 0 0 0 0 1\n")
     voxtile.build(scans, tmp_path / "map", resolution=1.0, layers="time")
     with voxtile.open(tmp_path / "map") as found:

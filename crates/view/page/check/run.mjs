@@ -281,7 +281,8 @@ try {
         // The second scan sees half of the floor.
         if (number === 0 || k >= 20) rows.push([...point, ...(isBox ? [90, 220, 40, 30, 6] : [30, 30, 160, 60, 2])].map((value) => +Number(value).toFixed(3)).join(','));
       }
-      writeFileSync(join(folder, `${number}.csv`), rows.join('\n'));
+      // The name has the time stamp.
+      writeFileSync(join(folder, `${start + 100 * number}.000000.csv`), rows.join('\n'));
     }
     writeFileSync(join(folder, 'poses_tum.txt'), [0, 1].map((k) => `${start + 100 * k} 0 0 5 0 0 0 1\n`).join(''));
     return folder;
