@@ -329,7 +329,7 @@ try {
   assert.match(said, /hits 1 colour 220 40 30 intensity 90.0 ± 0.0 class 6 building: 1 first hit 2011-09-26 13:04:32/);
   await colourBy('rgb');
   run('snapshot', layered, 'before');
-  run('build', painted(1317042572), '-o', layered, '--append', '--poses', join(work, 'painted1317042572/poses_tum.txt'), '-q');
+  run('build', painted(1317042572), '-o', layered, '--append', '--again', '--poses', join(work, 'painted1317042572/poses_tum.txt'), '-q');
   await browser.until('voxtile.generation[0] > 1');
   await browser.ready();
   assert.match(await colourBy('age'), /2011-09-26 13:04:32 13:11:12/);
