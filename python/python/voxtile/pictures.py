@@ -173,7 +173,7 @@ def _scale(columns: _Columns, color: str) -> tuple[NDArray[np.float64], str, tup
     seconds = np.where(is_known, (last_ns - first_ns) * 1e-9, np.nan)
     since = "the first"
     if _UNIX_TIMES_NS[0] <= first_ns < _UNIX_TIMES_NS[1]:
-        since = f"{np.datetime64(first_ns, 'ns').astype('datetime64[s]')} UTC".replace("T", " ")
+        since = str(np.datetime64(first_ns, "ns").astype("datetime64[s]")).replace("T", " ") + " UTC"
     return columns.values(seconds), f"last hit in s after {since}", (None, None)
 
 
