@@ -54,7 +54,8 @@ impl Levels {
     ///
     /// # Errors
     ///
-    /// [`InvalidArgument`](voxtile::Error::InvalidArgument) if the map has no such layer. Fails if a tile or the store cannot be read.
+    /// [`InvalidArgument`](voxtile::Error::InvalidArgument) if the map has no such layer. Fails if a tile or the store
+    /// cannot be read.
     pub fn layered_node<V: MapView>(
         &self,
         map: &V,

@@ -61,8 +61,8 @@ impl Scheme {
         (key, own.map(|k| k % MAX_EDGE))
     }
 
-    /// Returns the voxels of a node that contain a voxel of a child: one, or more if the tile's size is not a multiple of
-    /// the coarser voxel's size.
+    /// Returns the voxels of a node that contain a voxel of a child: one, or more if the tile's size is not a multiple
+    /// of the coarser voxel's size.
     pub(super) fn coarser(
         self,
         own: NodeKey,

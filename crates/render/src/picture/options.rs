@@ -8,8 +8,8 @@ use voxtile_distance::DistanceOptions;
 
 /// Options of a picture of a map.
 ///
-/// Memory: 12 bytes per cell (44 with the colors of a layer, one more with moving points), 4 per pixel, and one tile per
-/// thread, whatever the size of the map.
+/// Memory: 12 bytes per cell (44 with the colors of a layer, one more with moving points), 4 per pixel, and one tile
+/// per thread, whatever the size of the map.
 #[derive(Clone, Debug)]
 pub struct Picture {
     pub(super) view: View,
