@@ -156,7 +156,7 @@ impl Content {
             Ok::<_, Error>(drawn.transpose()?.map(|drawn| (drawn, caption)))
         };
         let layers = [
-            of_layer(Layer::Colour, "In colour: the mean of the points in the topmost occupied voxel.")?,
+            of_layer(Layer::Colour, "In color: the mean of the points in the topmost occupied voxel.")?,
             of_layer(
                 Layer::Class,
                 "By class: that of most points in the topmost occupied voxel, by the names of LAS.",

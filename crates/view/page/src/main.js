@@ -102,10 +102,11 @@ function describe() {
     $(id).replaceChildren(new Option(first, ''), ...map.snapshots.map(({ name }) => new Option(name, name)));
     $(id).value = map.snapshots.some(({ name }) => name === chosen) ? chosen : '';
   }
-  const before = $('colour').value;
-  const choices = COLOURS.filter(([value]) => !BY_LAYER[value] || maps.some(({ layers }) => layers?.includes(BY_LAYER[value])));
-  $('colour').replaceChildren(...choices.map(([value, text]) => new Option(text, value)));
-  $('colour').value = choices.some(([value]) => value === before) ? before : 'height';
+  // A map has the same layers from its creation on.
+  if ($('colour').options.length === 0) {
+    const has = ([value]) => !BY_LAYER[value] || maps.some(({ layers }) => layers?.includes(BY_LAYER[value]));
+    $('colour').replaceChildren(...COLOURS.filter(has).map(([value, text]) => new Option(text, value)));
+  }
   const tiles = map.tiles.toLocaleString('en');
   const lost = map.unreadable?.length ? `, ${map.unreadable.length} damaged` : '';
   const rest = map.pending_tiles ? `; reading the map: ${map.pending_tiles.toLocaleString('en')} tiles left` : '';
@@ -153,6 +154,8 @@ async function showMaps() {
   readPath();
   loadMoving();
   loadDistances();
+  // Flushes in the meantime.
+  catchUp();
 }
 
 async function readPath() {
