@@ -7,6 +7,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use voxtile::mapper::MapView;
 use voxtile::{Layers, MapConfig, PointAttributes, Result, Stop, VoxelLayers};
+use voxtile_render::classes::{class_color, class_label};
 
 /// Reads layers from a text, such as `"colour,class"`, or from a sequence of names.
 pub fn layers_of(layers: &Bound<'_, PyAny>) -> PyResult<Layers> {
@@ -15,6 +16,13 @@ pub fn layers_of(layers: &Bound<'_, PyAny>) -> PyResult<Layers> {
         Err(_) => layers.extract::<Vec<String>>()?.join(","),
     };
     text.parse().map_err(|error: voxtile::Error| wrong(layers.py(), "layers", error.to_string()))
+}
+
+/// Label of a class, by the names of LAS, and its color: red, green and blue, 0 to 255.
+#[pyfunction]
+#[pyo3(signature = (class, /))]
+pub fn class_style(class: u8) -> (String, (u8, u8, u8)) {
+    (class_label(class), class_color(class).into())
 }
 
 /// Takes the attributes of `points` points: colours as an array of N x 3 numbers from 0 to 255, classes as N numbers

@@ -49,6 +49,8 @@ mod _voxtile {
     #[pymodule_export]
     use super::distance::{DistanceField, compute_distances};
     #[pymodule_export]
+    use super::layers::class_style;
+    #[pymodule_export]
     use super::local_map::LocalMap;
     #[pymodule_export]
     use super::map::Map;

@@ -67,6 +67,69 @@ def test_the_picture_of_a_summary_is_opaque(room: Path) -> None:
     assert colored.any(axis=1).sum() == 2 and 44 <= colored.sum() <= 52
 
 
+@pytest.fixture
+def painted(tmp_path: Path) -> Path:
+    """A floor of 8 x 4 voxels, whose left half is brown ground and whose right half is a red building."""
+    x, y = np.meshgrid(np.arange(8) + 0.5, np.arange(4) + 0.5)
+    points = np.stack([x.ravel(), y.ravel(), np.full(32, 0.5)], 1)
+    is_left = points[:, 0] < 4
+    with voxtile.Map.create(tmp_path / "painted", 1.0, layers="colour,intensity,class") as made:
+        made.insert(
+            points,
+            origin=[4.0, 2.0, 50.0],
+            intensities=np.where(is_left, 10.0, 90.0),
+            colours=np.where(is_left[:, None], [120, 80, 40], [250, 20, 10]),
+            classes=np.where(is_left, 2, 6),
+        )
+    return tmp_path / "painted"
+
+
+def test_the_picture_of_a_summary_has_the_colors_of_the_map(painted: Path) -> None:
+    pytest.importorskip("matplotlib")
+    with voxtile.open(painted) as found:
+        text = found._repr_html_()
+    encoded = re.search('src="data:image/png;base64,([^"]+)"', text)
+    assert encoded is not None
+    pixels = pixels_of(base64.b64decode(encoded[1]))[:, :, :3]
+    counts = {tuple(color): count for color, count in zip(*np.unique(pixels.reshape(-1, 3), axis=0, return_counts=True))}
+    assert counts.pop((120, 80, 40)) == 16 and counts.pop((250, 20, 10)) == 16
+    assert set(counts) <= {(255, 255, 255)}
+
+
+def test_a_plot_shows_a_layer(painted: Path, room: Path) -> None:
+    pytest.importorskip("matplotlib")
+    with voxtile.open(painted) as found:
+        rgb, classes, intensities = (
+            found.plot(color=color, region=[[0, 0, 0], [8, 4, 1]]) for color in ("rgb", "class", "intensity")
+        )
+        with pytest.raises(ValueError, match="height, rgb, intensity, class, age"):
+            found.plot(color="heat")
+    colors = rgb.axes[0].images[0].get_array()
+    assert (colors[:, :4] == [120, 80, 40]).all() and (colors[:, 4:] == [250, 20, 10]).all()
+    colors = classes.axes[0].images[0].get_array()
+    assert (colors[:, :4] == [166, 124, 82]).all() and (colors[:, 4:] == [236, 126, 84]).all()
+    assert [text.get_text() for text in classes.axes[0].get_legend().get_texts()] == ["2 ground", "6 building"]
+    values = intensities.axes[0].images[0].get_array()
+    assert np.allclose(values[:, :4], 10, atol=0.01) and np.allclose(values[:, 4:], 90, atol=0.01)
+    with voxtile.open(room) as plain, pytest.raises(ValueError, match="layers='colour'"):
+        plain.plot(color="rgb")
+
+
+def test_a_plot_shows_times(tmp_path: Path) -> None:
+    pytest.importorskip("matplotlib")
+    scans = tmp_path / "scans"
+    scans.mkdir()
+    for number, stamp in enumerate(["1317042272.000000", "1317042284.500000"]):
+        (scans / f"{stamp}.xyz").write_text(f"{5.5 + number} 0.5 0.5\n")
+    (scans / "poses_tum.txt").write_text("1317042272 0 0 0 0 0 0 1\n1317042284.5 0 0 0 0 0 0 1\n")
+    voxtile.build(scans, tmp_path / "map", resolution=1.0, layers="time")
+    with voxtile.open(tmp_path / "map") as found:
+        figure = found.plot(color="age")
+    times = figure.axes[0].images[0].get_array()
+    assert np.allclose(times[~np.isnan(times)], [0.0, 12.5])
+    assert figure.axes[1].get_ylabel() == "last hit in s after 2011-09-26 13:04:32 UTC"
+
+
 def test_a_plot_is_a_picture_in_a_notebook(room: Path) -> None:
     pytest.importorskip("matplotlib")
     with voxtile.open(room) as found:

@@ -246,6 +246,14 @@ pub enum ColorName {
     Count,
     /// Number of the last scan in the tile's latest flush
     LastScan,
+    /// Mean color of the points in the topmost occupied voxel; needs the layer colour
+    Rgb,
+    /// Their mean intensity, from the 2nd to the 98th percentile; needs the layer intensity
+    Intensity,
+    /// Their most frequent class, by the names of LAS; needs the layer class
+    Class,
+    /// Time of the last scan that hit the topmost occupied voxel; needs the layer time
+    Age,
 }
 
 #[derive(Debug, Args)]

@@ -17,7 +17,7 @@ use voxtile::scan::ScanReport;
 use voxtile::space::Point;
 use voxtile::{Error, MapConfig};
 use voxtile_pipeline::Summary;
-use voxtile_render::Picture;
+use voxtile_render::{ColorBy, Picture};
 use voxtile_simulation::{City, Drive, Lidar, Survey};
 
 /// Distance between scans.
@@ -34,6 +34,9 @@ pub fn run(args: &DemoArgs) -> anyhow::Result<ExitCode> {
         .with_cache_tiles(args.cache_tiles)
         .with_write_buffer_bytes(4 << 20)
         .with_storage(args.storage.into());
+    if let ColorBy::Layer(layer) = args.color.into() {
+        layer.check(&config.layers())?;
+    }
     let (mut mapper, done) = begin(args, &map, config)?;
     mapper.stop_with(stop.clone());
     let scans = args.length.div_ceil(SPACING_M) as usize;

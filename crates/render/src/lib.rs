@@ -22,9 +22,15 @@
 //! # }
 //! ```
 
+pub mod classes;
+mod layer;
 pub mod levels;
 mod picture;
 mod survey;
 
-pub use picture::{Change, ColorBy, Drawing, Drawn, Image, OverTime, Panel, Picture, SideAxis, View, colors};
+pub use layer::Layer;
+pub use picture::{
+    Change, ColorBy, Drawing, Drawn, Image, OverTime, Panel, Picture, SideAxis, View, colors, is_unix_time,
+    time_labels,
+};
 pub use survey::{HeightBin, Survey};

@@ -1,5 +1,6 @@
 use rayon::prelude::*;
 use serde::Serialize;
+use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicU64, Ordering};
 use voxtile::mapper::MapView;
 use voxtile::sensor::Evidence;
@@ -26,6 +27,9 @@ pub struct Survey {
     pub probabilities: [u64; 20],
     /// Occupied voxels by height, from the lowest bin.
     pub heights: Vec<HeightBin>,
+    /// Occupied voxels by class of most points; empty without this layer.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub classes: BTreeMap<u8, u64>,
     /// Tiles that could not be read and are not counted.
     pub unread: Vec<[i32; 3]>,
 }
@@ -83,6 +87,7 @@ struct Counts {
     occupied_columns: u64,
     probabilities: [u64; 20],
     heights: Vec<u64>,
+    classes: BTreeMap<u8, u64>,
     unread: Vec<[i32; 3]>,
 }
 
@@ -100,6 +105,7 @@ impl<'a> Counter<'a> {
         let config = self.map.config();
         let occupied_from = config.occupied_log_odds();
         let edge = config.grid.voxels_per_tile_edge();
+        let has_classes = config.layers().class;
         // By column: bit 1 is observed, bit 2 is occupied.
         let mut columns = vec![0_u8; (edge * edge) as usize];
         let mut counts = Counts::default();
@@ -118,6 +124,12 @@ impl<'a> Counter<'a> {
             for voxel in tile.voxels() {
                 let [x, y] = [0, 1].map(|k| voxel.index[k].wrapping_sub(corner[k]));
                 let is_occupied = voxel.evidence.log_odds >= occupied_from;
+                if has_classes
+                    && is_occupied
+                    && let Some(class) = tile.layers_of(voxel.index).and_then(|layers| layers.class())
+                {
+                    *counts.classes.entry(class).or_default() += 1;
+                }
                 counts.add(voxel.evidence, is_occupied.then(|| self.bin_of(voxel.index[2])));
                 if let Some(column) = columns.get_mut((x + y * edge) as usize) {
                     *column |= if is_occupied { 3 } else { 1 };
@@ -136,8 +148,16 @@ impl<'a> Counter<'a> {
     fn survey(&self, counts: Counts) -> Survey {
         let resolution_m = self.map.config().grid.resolution_m();
         let border_m = |bin: usize| (self.bottom + bin as i64 * self.bin) as f64 * resolution_m;
-        let Counts { voxels, occupied, columns, occupied_columns, probabilities, heights, mut unread } =
-            counts;
+        let Counts {
+            voxels,
+            occupied,
+            columns,
+            occupied_columns,
+            probabilities,
+            heights,
+            classes,
+            mut unread,
+        } = counts;
         unread.sort_unstable();
         let first = heights.iter().position(|&count| count > 0).unwrap_or(heights.len());
         let bins = heights.into_iter().enumerate().skip(first);
@@ -152,6 +172,7 @@ impl<'a> Counter<'a> {
             heights: bins
                 .map(|(bin, occupied)| HeightBin { from_m: border_m(bin), to_m: border_m(bin + 1), occupied })
                 .collect(),
+            classes,
             unread,
         }
     }
@@ -181,6 +202,7 @@ impl Counts {
             std::mem::swap(&mut self.heights, &mut other.heights);
         }
         self.heights.iter_mut().zip(other.heights).for_each(|(sum, count)| *sum += count);
+        other.classes.iter().for_each(|(class, count)| *self.classes.entry(*class).or_default() += count);
         self.unread.append(&mut other.unread);
         self
     }

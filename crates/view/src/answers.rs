@@ -16,6 +16,7 @@ use voxtile::space::{Aabb, VoxelIndex};
 use voxtile::{Error, Point, Queries, Result};
 use voxtile_pipeline::AnyMap;
 use voxtile_pipeline::answer_at;
+use voxtile_render::Layer;
 
 /// Maximum number of positions in a trajectory.
 const TRAJECTORY: usize = 20_000;
@@ -36,7 +37,10 @@ fn describe(number: usize, map: &ServedMap) -> Value {
     });
     let listed = map.snapshots();
     let snapshots = listed.iter().map(|listed| json!({ "name": listed.name, "tiles": listed.tiles }));
-    json!({
+    let layers = state.map.config().layers();
+    let layers: Vec<_> =
+        Layer::ALL.into_iter().filter(|layer| layer.is_in(&layers)).map(Layer::name).collect();
+    let mut described = json!({
         "id": number.to_string(),
         "name": map.name(),
         "resolution_m": grid.resolution_m(),
@@ -48,7 +52,11 @@ fn describe(number: usize, map: &ServedMap) -> Value {
         "snapshots": snapshots.collect::<Vec<_>>(),
         "pending_tiles": state.pending_tiles,
         "unreadable": state.levels.unreadable(),
-    })
+    });
+    if !layers.is_empty() {
+        described["layers"] = layers.into();
+    }
+    described
 }
 
 /// Responds to a request for a map; `stop` ends the work early. Returns `None` if it needs levels that are not built yet and may not be built here.
@@ -103,7 +111,9 @@ fn status_of(error: &Error) -> StatusCode {
 /// it.
 fn of_levels(shown: &Shown, thing: &Thing, version: Option<u64>) -> Result<Option<Answer>> {
     let keep = match thing {
-        Thing::Node(key, _) | Thing::Subtree(key) if version.is_some() && shown.version(*key)? == version => {
+        Thing::Node(key, _) | Thing::LayeredNode(key, _) | Thing::Subtree(key)
+            if version.is_some() && shown.version(*key)? == version =>
+        {
             Keep::ForEver
         }
         _ => Keep::No,
@@ -113,6 +123,10 @@ fn of_levels(shown: &Shown, thing: &Thing, version: Option<u64>) -> Result<Optio
         Thing::Tileset => Some(Answer::json(shown.tileset()?)),
         Thing::Subtree(key) => shown.subtree(*key)?.map(Answer::json).map(kept),
         Thing::Node(key, kind) => shown.node(*key, *kind)?.map(|bytes| Answer::bytes(bytes, keep)),
+        Thing::LayeredNode(key, layer) => {
+            shown.layered_node(*key, *layer)?.map(|bytes| Answer::bytes(bytes, keep))
+        }
+        Thing::Layers => Some(Answer::json(shown.state().layer_legends()?)),
         Thing::Query(_) | Thing::Raycast(..) | Thing::Trajectory | Thing::Moving | Thing::Distances(..) => {
             None
         }
@@ -133,7 +147,9 @@ fn query_result(map: &AnyMap, thing: &Thing, version: Option<u64>, stop: &Stop) 
             let bytes = distance_slice(map, *around, *cap_m, stop)?;
             return Ok(Some(Answer::bytes(bytes, Keep::No)));
         }
-        Thing::Tileset | Thing::Subtree(_) | Thing::Node(..) => return Ok(None),
+        Thing::Tileset | Thing::Subtree(_) | Thing::Node(..) | Thing::LayeredNode(..) | Thing::Layers => {
+            return Ok(None);
+        }
     };
     Ok(Some(Answer::json(answer)))
 }

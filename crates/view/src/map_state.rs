@@ -1,9 +1,13 @@
+use serde_json::json;
 use std::sync::Arc;
 use voxtile::Result;
+use voxtile::mapper::MapView;
 use voxtile_pipeline::AnyMap;
+use voxtile_render::classes::{class_color, class_name};
 use voxtile_render::levels::{
     Difference, Kind, Levels, LevelsOf, NodeKey, NodeStore, TilesetContent, TilesetNodes, subtree, tileset,
 };
+use voxtile_render::{Layer, is_unix_time};
 
 /// One state of a map: a flush or a snapshot.
 pub struct MapState {
@@ -75,6 +79,14 @@ impl Shown {
         }
     }
 
+    /// Returns the compressed bytes of a node with the values of a layer. Changes have none.
+    pub fn layered_node(&self, key: NodeKey, layer: Layer) -> Result<Option<Vec<u8>>> {
+        match self {
+            Self::State(state) => state.levels.layered_node(&state.map, &state.store, key, layer),
+            Self::Change { .. } => self.node(key, Kind::Occupied),
+        }
+    }
+
     /// Returns the compressed bytes of a node.
     pub fn node(&self, key: NodeKey, kind: Kind) -> Result<Option<Vec<u8>>> {
         match self {
@@ -89,6 +101,35 @@ fn difference<'a>(before: &'a MapState, after: &'a MapState) -> Result<Differenc
 }
 
 impl MapState {
+    /// Returns `layers.json`: what legends show of the layers of all occupied voxels.
+    pub fn layer_legends(&self) -> Result<serde_json::Value> {
+        let totals = self.levels.layer_totals(&self.map, &self.store)?;
+        let layers = self.map.config().layers();
+        let mut legends = serde_json::Map::new();
+        if layers.colour {
+            legends.insert("colour".into(), json!({}));
+        }
+        if layers.intensity_max.is_some() {
+            legends.insert("intensity".into(), json!({ "range": totals.intensity_range(&layers) }));
+        }
+        if layers.class {
+            let class = |(class, voxels)| {
+                let (name, color) = (class_name(class), class_color(class));
+                json!({ "class": class, "name": name, "color": color, "voxels": voxels })
+            };
+            legends.insert(
+                "class".into(),
+                json!({ "classes": totals.classes().map(class).collect::<Vec<_>>() }),
+            );
+        }
+        if layers.time {
+            let range_s = totals.time().map(|time| [time.first_ns, time.last_ns].map(|ns| ns as f64 * 1e-9));
+            let is_unix = range_s.is_some_and(|range| range.into_iter().all(is_unix_time));
+            legends.insert("time".into(), json!({ "range_s": range_s, "is_unix_time": is_unix }));
+        }
+        Ok(legends.into())
+    }
+
     pub fn nodes(&self) -> LevelsOf<'_, AnyMap> {
         LevelsOf { levels: &self.levels, map: &self.map }
     }

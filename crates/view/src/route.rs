@@ -2,6 +2,7 @@ use super::token::Token;
 use std::str::FromStr;
 use voxtile::Point;
 use voxtile::store::SnapshotName;
+use voxtile_render::Layer;
 use voxtile_render::levels::{Kind, NodeKey};
 
 /// Resource of a request.
@@ -35,6 +36,10 @@ pub enum Thing {
     Tileset,
     Subtree(NodeKey),
     Node(NodeKey, Kind),
+    /// Occupied voxels of a node, with the values of a layer.
+    LayeredNode(NodeKey, Layer),
+    /// Ranges and classes of the layers, for legends.
+    Layers,
     Query(Point),
     Raycast(Point, Point),
     Trajectory,
@@ -83,7 +88,10 @@ impl Thing {
 
     /// Returns whether the resource needs the levels of a state.
     pub fn takes_levels(&self) -> bool {
-        matches!(self, Self::Tileset | Self::Subtree(_) | Self::Node(..))
+        matches!(
+            self,
+            Self::Tileset | Self::Subtree(_) | Self::Node(..) | Self::LayeredNode(..) | Self::Layers
+        )
     }
 
     fn of(path: &str, question: &str) -> Option<Self> {
@@ -91,6 +99,7 @@ impl Thing {
         match path {
             "tileset.json" => Some(Self::Tileset),
             "trajectory.json" => Some(Self::Trajectory),
+            "layers.json" => Some(Self::Layers),
             "moving.bin" => Some(Self::Moving),
             "distances.bin" => {
                 let [around, cap_m] = ["at", "cap"].map(|name| field(question, name));
@@ -106,13 +115,15 @@ impl Thing {
             _ => match path.split_once('/')? {
                 ("subtree", rest) => Some(Self::Subtree(key(rest, ".json")?)),
                 ("node", rest) => {
-                    let kind = match field(question, "what") {
-                        None | Some("occupied") => Kind::Occupied,
-                        Some("free") => Kind::Free,
-                        Some("unknown") => Kind::Unknown,
-                        Some(_) => return None,
-                    };
-                    Some(Self::Node(key(rest, ".vox")?, kind))
+                    let key = key(rest, ".vox")?;
+                    let layer = field(question, "layer").map(str::parse).transpose().ok()?;
+                    Some(match (field(question, "what"), layer) {
+                        (None | Some("occupied"), None) => Self::Node(key, Kind::Occupied),
+                        (None | Some("occupied"), Some(layer)) => Self::LayeredNode(key, layer),
+                        (Some("free"), None) => Self::Node(key, Kind::Free),
+                        (Some("unknown"), None) => Self::Node(key, Kind::Unknown),
+                        _ => return None,
+                    })
                 }
                 _ => None,
             },
@@ -181,6 +192,10 @@ mod tests {
         let key = NodeKey { level: 2, index: [0, -1, 3] };
         let node = route("/sesame_42/maps/1/node/2/0/-1/3.vox", Some("v=00ff&what=free"));
         assert_eq!(node, Some(Route::Of(now.clone(), Thing::Node(key, Kind::Free))));
+        let node = route("/sesame_42/maps/1/node/2/0/-1/3.vox", Some("v=00ff&layer=class"));
+        assert_eq!(node, Some(Route::Of(now.clone(), Thing::LayeredNode(key, Layer::Class))));
+        let layers = route("/sesame_42/maps/1/layers.json", None);
+        assert_eq!(layers, Some(Route::Of(now.clone(), Thing::Layers)));
         let query = route("/sesame_42/maps/1/query", Some("x=1&y=-2.5&z=3e1"));
         assert_eq!(query, Some(Route::Of(now.clone(), Thing::Query([1.0, -2.5, 30.0]))));
         let ray = route("/sesame_42/maps/1/raycast", Some("from=0,0,0&to=1%2C2,3"));
@@ -237,7 +252,9 @@ mod tests {
         {
             assert_eq!(route("/sesame_42/maps/0/raycast", Some(question)), None, "{question}");
         }
-        assert_eq!(route("/sesame_42/maps/0/node/0/0/0/0.vox", Some("what=everything")), None);
+        for question in ["what=everything", "layer=shape", "layer=", "what=free&layer=colour"] {
+            assert_eq!(route("/sesame_42/maps/0/node/0/0/0/0.vox", Some(question)), None, "{question}");
+        }
         for question in ["at=1,2,3", "cap=1", "at=nan,0,0&cap=1", "at=1,2,3&cap=x"] {
             assert_eq!(route("/sesame_42/maps/0/distances.bin", Some(question)), None, "{question}");
         }

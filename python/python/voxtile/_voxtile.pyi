@@ -19,6 +19,7 @@ __all__ = [
     "call_build",
     "call_export",
     "call_export_scans",
+    "class_style",
     "clean",
     "clear",
     "compute_distances",
@@ -299,6 +300,7 @@ def remap(
     memory: int | str | None = None,
     progress: _Progress | None = None,
 ) -> dict[str, Any]: ...
+def class_style(number: int, /) -> tuple[str, tuple[int, int, int]]: ...
 def clean(
     map: _Path,
     *,

@@ -14,13 +14,77 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ._voxtile import Map
+from ._voxtile import Map, class_style
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 _MOST_PIXELS = 2048
+# Layers by the names of colors, as in `voxtile picture --color`.
+_LAYERS = {"rgb": "colour", "intensity": "intensity", "class": "class", "age": "time"}
+_NO_VALUE = (92, 98, 108)
+# Nanoseconds since 1970 from 2000 to 2100; other time stamps count from another epoch.
+_UNIX_TIMES_NS = (946_684_800 * 10**9, 4_102_444_800 * 10**9)
+
+
+class _Columns:
+    """The highest occupied voxel of each column of voxels, as an array of rows (y) and columns (x).
+
+    An element is a whole voxel, or several if an edge would exceed ``max_pixels``. Uses the memory of one tile and of the
+    picture.
+    """
+
+    def __init__(self, map: Map, region: Any, min_probability: float | None, max_pixels: int) -> None:
+        self.map = map
+        self.extent = (0.0, 1.0, 0.0, 1.0)
+        self.tops = np.full((1, 1, 3), np.nan)
+        bounds = map.bounds if region is None else np.asarray(region, np.float64).reshape(2, 3)
+        if bounds is None:
+            return
+        low, high = bounds
+        edge = map.resolution * max(1, int(np.ceil((high - low)[:2].max() / map.resolution / max_pixels)))
+        columns, rows = np.maximum(1, np.ceil((high - low)[:2] / edge - 1e-9)).astype(int)
+        tops = np.full((rows * columns, 3), -np.inf)
+        for _, centers, _ in map.occupied_by_tile(min_probability):
+            inside = centers[((low <= centers) & (centers < high)).all(axis=1)]
+            at = np.floor((inside[:, :2] - low[:2]) / edge).astype(int)
+            at = np.minimum(at[:, 1], rows - 1) * columns + np.minimum(at[:, 0], columns - 1)
+            # The last one of an element is the highest.
+            order = np.argsort(inside[:, 2], kind="stable")
+            inside, at = inside[order], at[order]
+            higher = inside[:, 2] > tops[at, 2]
+            tops[at[higher]] = inside[higher]
+        tops[np.isinf(tops[:, 2])] = np.nan
+        self.tops = tops.reshape(rows, columns, 3)
+        self.extent = (float(low[0]), float(low[0] + columns * edge), float(low[1]), float(low[1] + rows * edge))
+
+    @property
+    def heights(self) -> NDArray[np.float64]:
+        """Heights in metres; NaN for columns without an occupied voxel."""
+        return self.tops[:, :, 2]
+
+    def layer(self, name: str) -> NDArray[Any]:
+        """Values of a layer, with an element for each one of ``known``."""
+        return self.map.layers_at(self.tops[self.known])[name]
+
+    @property
+    def known(self) -> NDArray[np.bool_]:
+        """Whether a column has an occupied voxel."""
+        return ~np.isnan(self.heights)
+
+    def image(self, colors: NDArray[Any]) -> NDArray[np.uint8]:
+        """Returns an opaque image of colors of the known elements; NaN becomes grey, unknown elements are white."""
+        image = np.full((*self.known.shape, 3), 255, np.uint8)
+        colors = np.where(np.isnan(colors), _NO_VALUE, colors)
+        image[self.known] = np.round(colors).astype(np.uint8)
+        return image
+
+    def values(self, values: NDArray[Any]) -> NDArray[np.float64]:
+        """Returns an array of values of the known elements; NaN elsewhere."""
+        array = np.full(self.known.shape, np.nan)
+        array[self.known] = values
+        return array
 
 
 def heights(
@@ -34,43 +98,83 @@ def heights(
     Returns an array of rows (y) and columns (x), and its extent: left, right, bottom, top. A column of the array is
     a whole voxel, or several if an edge would exceed ``max_pixels``. Uses the memory of one tile and of the picture.
     """
-    bounds = map.bounds if region is None else np.asarray(region, np.float64).reshape(2, 3)
-    if bounds is None:
-        return np.full((1, 1), np.nan), (0.0, 1.0, 0.0, 1.0)
-    low, high = bounds
-    edge = map.resolution * max(1, int(np.ceil((high - low)[:2].max() / map.resolution / max_pixels)))
-    columns, rows = np.maximum(1, np.ceil((high - low)[:2] / edge - 1e-9)).astype(int)
-    highest = np.full((rows, columns), -np.inf)
-    for _, centers, _ in map.occupied_by_tile(min_probability):
-        inside = centers[((low <= centers) & (centers < high)).all(axis=1)]
-        at = np.floor((inside[:, :2] - low[:2]) / edge).astype(int)
-        np.maximum.at(highest, (np.minimum(at[:, 1], rows - 1), np.minimum(at[:, 0], columns - 1)), inside[:, 2])
-    highest[np.isinf(highest)] = np.nan
-    extent = (float(low[0]), float(low[0] + columns * edge), float(low[1]), float(low[1] + rows * edge))
-    return highest, extent
+    columns = _Columns(map, region, min_probability, max_pixels)
+    return columns.heights, columns.extent
 
 
-def plot(map: Map, *, region: Any = None, min_probability: float | None = None, ax: Axes | None = None) -> Figure:
-    """Draws the map from above: the height of the highest occupied voxel of each column, in metres.
+def plot(
+    map: Map,
+    *,
+    color: str = "height",
+    region: Any = None,
+    min_probability: float | None = None,
+    ax: Axes | None = None,
+) -> Figure:
+    """Draws the map from above: the highest occupied voxel of each column.
 
-    ``region`` is a box, lower and upper corner; ``ax`` are axes to draw into. Needs matplotlib. Returns the figure. A
-    notebook shows it as the result of a cell, or with ``display``; in a program, ``savefig`` writes it.
+    ``color`` is ``"height"`` in metres, or a layer of the map: ``"rgb"``, ``"intensity"``, ``"class"``, or ``"age"`` (the
+    time of the last hit). ``region`` is a box, lower and upper corner; ``ax`` are axes to draw into. Needs matplotlib.
+    Returns the figure. A notebook shows it as the result of a cell, or with ``display``; in a program, ``savefig`` writes
+    it.
     """
     from matplotlib.figure import Figure as NewFigure
+    from matplotlib.patches import Patch
 
-    values, extent = heights(map, region, min_probability)
+    if color != "height":
+        name = _LAYERS.get(color)
+        if name is None:
+            raise ValueError(f"color: {color!r} is none of height, {', '.join(_LAYERS)}")
+        if name not in map.layers:
+            raise ValueError(f"color: {color!r} needs the layer {name}; build a map with layers={name!r}")
+    columns = _Columns(map, region, min_probability, _MOST_PIXELS)
     figure = NewFigure(figsize=(8, 6)) if ax is None else ax.figure
     axes = figure.add_subplot() if ax is None else ax
-    image = axes.imshow(values, origin="lower", extent=extent, interpolation="nearest", cmap="viridis")
+    draw = functools.partial(axes.imshow, origin="lower", extent=columns.extent, interpolation="nearest")
+    if color == "rgb":
+        draw(columns.image(columns.layer("colour")))
+    elif color == "class":
+        classes = columns.layer("class")
+        colors = np.full((len(classes), 3), np.nan)
+        patches = []
+        for number in np.unique(classes[classes >= 0]).tolist():
+            label, style = class_style(number)
+            colors[classes == number] = style
+            patches.append(Patch(color=np.divide(style, 255).tolist(), label=label))
+        draw(columns.image(colors))
+        if patches:
+            axes.legend(handles=patches, loc="upper left", bbox_to_anchor=(1.0, 1.0), frameon=False)
+    else:
+        values, label, ends = _scale(columns, color)
+        image = draw(values, cmap="viridis", vmin=ends[0], vmax=ends[1])
+        figure.colorbar(image, ax=axes, label=label)
     axes.set_xlabel("x in m")
     axes.set_ylabel("y in m")
     axes.set_aspect("equal")
-    figure.colorbar(image, ax=axes, label="height in m")
     whole: Figure = axes.get_figure(root=True)  # type: ignore[assignment]
     if ax is None:
         # Notebooks show figures by themselves only after pyplot was imported.
         setattr(whole, "_repr_png_", functools.partial(_png_of, whole))
     return whole
+
+
+def _scale(columns: _Columns, color: str) -> tuple[NDArray[np.float64], str, tuple[float | None, float | None]]:
+    """Returns values, their name, and the ends of the scale."""
+    if color == "height":
+        return columns.heights, "height in m", (None, None)
+    if color == "intensity":
+        values = columns.values(columns.layer("intensity"))
+        known = values[~np.isnan(values)]
+        low, high = np.percentile(known, [2, 98]) if len(known) else (0.0, 1.0)
+        return values, "intensity", (float(low), float(high))
+    last_ns = columns.layer("last_ns")
+    is_known = last_ns > np.iinfo(np.int64).min
+    first_ns = int(last_ns[is_known].min()) if is_known.any() else 0
+    # The difference of integers is exact; times since 1970 as floats are not.
+    seconds = np.where(is_known, (last_ns - first_ns) * 1e-9, np.nan)
+    since = "the first"
+    if _UNIX_TIMES_NS[0] <= first_ns < _UNIX_TIMES_NS[1]:
+        since = str(np.datetime64(first_ns, "ns").astype("datetime64[s]")).replace("T", " ") + " UTC"
+    return columns.values(seconds), f"last hit in s after {since}", (None, None)
 
 
 def _png_of(figure: Figure) -> bytes:
@@ -99,14 +203,22 @@ def _picture_html(map: Map) -> str:
         from matplotlib.image import imsave
     except ImportError:
         return ""
-    values, _ = heights(map, max_pixels=256)
+    columns = _Columns(map, None, None, 256)
+    values = columns.heights
     if np.isnan(values).all():
         return ""
     png = io.BytesIO()
+    if "colour" in map.layers:
+        imsave(png, columns.image(columns.layer("colour")), origin="lower", format="png")
+        return _image_html(png)
     # Unknown columns are white: on a dark page, a transparent background would hide the shape of the map. They are masked,
     # because some versions of matplotlib take the range of colors from NaN.
     colors = colormaps["viridis"].with_extremes(bad="white")
     imsave(png, np.ma.masked_invalid(values), origin="lower", format="png", cmap=colors)
+    return _image_html(png)
+
+
+def _image_html(png: io.BytesIO) -> str:
     return f'<img alt="from above" src="data:image/png;base64,{base64.b64encode(png.getvalue()).decode()}">'
 
 

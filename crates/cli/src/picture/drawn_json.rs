@@ -1,6 +1,7 @@
 use crate::args::{ColorName, PictureArgs, ViewName};
 use clap::ValueEnum;
 use serde::Serialize;
+use std::collections::BTreeMap;
 use std::path::Path;
 use voxtile::space::Aabb;
 use voxtile_pipeline::memory;
@@ -26,6 +27,9 @@ pub struct DrawnJson {
     range: Option<[f64; 2]>,
     known_cells: u64,
     solid_cells: u64,
+    /// Cells of each class; with `--color class`.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    classes: BTreeMap<u8, u64>,
     /// Points marked as moving that are drawn; with `--moving`.
     moving_points: Option<u64>,
     /// Points of all kept scans that are marked as moving; with `--moving`.
@@ -54,6 +58,7 @@ impl DrawnJson {
             range: drawn.range,
             known_cells: drawn.known_cells,
             solid_cells: drawn.solid_cells,
+            classes: drawn.classes.iter().copied().collect(),
             moving_points: drawn.moving_points,
             marked_points,
             tiles: drawn.tiles,

@@ -21,7 +21,8 @@ use voxtile::{Error, Result};
 use voxtile_distance::DistanceOptions;
 use voxtile_pipeline::output::{OutputFile, is_standard_output};
 use voxtile_pipeline::{AnyMap, read_any_map};
-use voxtile_render::{ColorBy, Drawing, Drawn, Picture, SideAxis, View};
+use voxtile_render::classes::class_label;
+use voxtile_render::{ColorBy, Drawing, Drawn, Layer, Picture, SideAxis, View, time_labels};
 
 /// Draws a map and prints a summary, to standard error if the picture is written to standard output. `is_quiet`
 /// suppresses the summary.
@@ -120,6 +121,10 @@ impl From<ColorName> for ColorBy {
             ColorName::Probability => Self::Probability,
             ColorName::Count => Self::Count,
             ColorName::LastScan => Self::LastScan,
+            ColorName::Rgb => Self::Layer(Layer::Colour),
+            ColorName::Intensity => Self::Layer(Layer::Intensity),
+            ColorName::Class => Self::Layer(Layer::Class),
+            ColorName::Age => Self::Layer(Layer::Time),
         }
     }
 }
@@ -196,6 +201,10 @@ fn caption(args: &PictureArgs, drawn: &Drawn, marked: Option<u64>) -> String {
     };
     let [across, up] = axes.map(|axis| region.max[axis] - region.min[axis]);
     let scale = match (drawn.range, args.color) {
+        (None, ColorName::Class) if args.since.is_none() && !drawn.classes.is_empty() => {
+            let labels: Vec<_> = drawn.classes.iter().map(|(class, _)| class_label(*class)).collect();
+            format!("; classes {}", labels.join(", "))
+        }
         (None, _) => String::new(),
         (Some([.., most]), _) if args.distance_slice.is_some() => {
             format!("; distance 0 m (dark) to {most} m")
@@ -204,6 +213,12 @@ fn caption(args: &PictureArgs, drawn: &Drawn, marked: Option<u64>) -> String {
         (Some([least, most]), ColorName::Probability) => format!("; probability {least} (dark) to {most}"),
         (Some([least, most]), ColorName::Count) => format!("; count {least:.0} (dark) to {most:.0}"),
         (Some([least, most]), ColorName::LastScan) => format!("; last scan {least:.0} (dark) to {most:.0}"),
+        (Some([least, most]), ColorName::Intensity) => format!("; intensity {least:.1} (dark) to {most:.1}"),
+        (Some(range), ColorName::Age) => {
+            let [first, last] = time_labels(range);
+            format!("; last hit {first} (dark) to {last}")
+        }
+        (Some(_), ColorName::Rgb | ColorName::Class) => String::new(),
     };
     let changes = if args.since.is_some() { "; blue appeared, orange vanished, grey unchanged" } else { "" };
     let moving = match (marked, drawn.moving_points.unwrap_or_default()) {

@@ -22,7 +22,7 @@ use voxtile_pipeline::memory;
 use voxtile_pipeline::output::{OutputFile, is_standard_output};
 use voxtile_pipeline::place::place_of;
 use voxtile_pipeline::{AnyMap, MapAt, read_any_map};
-use voxtile_render::{Drawn, Picture, SideAxis, Survey, View};
+use voxtile_render::{ColorBy, Drawn, Layer, Picture, SideAxis, Survey, View};
 
 /// Content of the report.
 struct Report {
@@ -40,6 +40,8 @@ struct Content {
     survey: Survey,
     above: Drawn,
     side: Drawn,
+    /// Pictures by the layers that the map has, with their captions.
+    layers: Vec<(Drawn, &'static str)>,
     scans: std::result::Result<Vec<ScanRecord>, String>,
     sizes: Sizes,
 }
@@ -147,11 +149,25 @@ impl Content {
         // Look along the shorter side, which shows the longer one.
         let is_long_in_y = info.bounds_m.is_some_and(|b| b.max[1] - b.min[1] > b.max[0] - b.min[0]);
         let axis = if is_long_in_y { SideAxis::Y } else { SideAxis::X };
+        let of_layer = |layer: Layer, caption: &'static str| {
+            let above = above.clone().with_color(ColorBy::Layer(layer));
+            let drawn =
+                layer.is_in(&reader.config().layers()).then(|| above.draw(reader.as_ref(), on_progress));
+            Ok::<_, Error>(drawn.transpose()?.map(|drawn| (drawn, caption)))
+        };
+        let layers = [
+            of_layer(Layer::Colour, "In color: the mean of the points in the topmost occupied voxel.")?,
+            of_layer(
+                Layer::Class,
+                "By class: that of most points in the topmost occupied voxel, by the names of LAS.",
+            )?,
+        ];
         let side =
             picture.with_view(View::Side(axis)).with_size_px(SIDE_PX).with_title(title("from the side"));
         Ok(Self {
             above: above.draw(reader.as_ref(), on_progress)?,
             side: side.draw(reader.as_ref(), on_progress)?,
+            layers: layers.into_iter().flatten().collect(),
             survey: Survey::of(reader.as_ref(), on_progress)?,
             scans: reader.scans().map_err(|error| format!("{error:#}")),
             sizes: Sizes::of(reader),

@@ -8,6 +8,7 @@ use indicatif::{HumanBytes, HumanCount};
 use std::fmt::Display;
 use std::io::{self, Write};
 use voxtile::store::ScanRecord;
+use voxtile_render::classes::class_label;
 use voxtile_render::{Drawn, Survey, colors};
 
 const STYLE: &str = include_str!("style.css");
@@ -130,8 +131,12 @@ impl Content {
             &self.above,
             "From above: each column in the color of its topmost occupied voxel.",
         )?;
+        for (drawn, caption) in &self.layers {
+            write_picture(out, drawn, caption)?;
+        }
         write_picture(out, &self.side, "From the side.")?;
         self.write_numbers(out)?;
+        write_classes(out, survey)?;
         write_histograms(out, survey)?;
         self.sizes.write(out)
     }
@@ -176,6 +181,23 @@ impl Content {
         }
         Ok(())
     }
+}
+
+/// Writes the occupied voxels by class.
+fn write_classes(out: &mut impl Write, survey: &Survey) -> io::Result<()> {
+    if survey.classes.is_empty() {
+        return Ok(());
+    }
+    begin_table(out, "Classes of occupied voxels", &["class", "#voxels", "#share"])?;
+    let without = survey.occupied - survey.classes.values().sum::<u64>();
+    let classes = survey.classes.iter().map(|(class, count)| (class_label(*class), *count));
+    for (label, count) in classes.chain((without > 0).then(|| ("no class".to_owned(), without))) {
+        write!(out, "<tr><td>{label}</td>")?;
+        number_cell(out, HumanCount(count))?;
+        number_cell(out, format!("{:.1} %", 100.0 * count as f64 / survey.occupied as f64))?;
+        writeln!(out, "</tr>")?;
+    }
+    end_table(out)
 }
 
 fn write_scans(out: &mut impl Write, scans: &[ScanRecord]) -> io::Result<()> {

@@ -222,6 +222,74 @@ fn a_report_has_the_numbers_of_info() {
     check_markup(&fs::read_to_string(other).unwrap());
 }
 
+/// Builds a map of a floor (class 2, brown) with a box (class 6, red), with colours, intensities and classes.
+fn coloured_map(folder: &Path, layers: &str) -> PathBuf {
+    let mut rows = String::from("x,y,z,intensity,r,g,b,class\n");
+    for (x, y) in (0..40).flat_map(|x| (0..40).map(move |y| (x, y))) {
+        let is_box = (10..20).contains(&x) && (10..20).contains(&y);
+        let (z, attributes) = if is_box { (1.05, "90,250,20,10,6") } else { (0.05, "30,120,80,40,2") };
+        rows += &format!("{},{},{z},{attributes}\n", 0.05 + 0.1 * f64::from(x), 0.05 + 0.1 * f64::from(y));
+    }
+    let (cloud, map) = (folder.join("floor.csv"), folder.join("coloured"));
+    fs::write(&cloud, rows).unwrap();
+    output(&[
+        "build",
+        text(&cloud),
+        "-o",
+        text(&map),
+        "--no-rays",
+        "--resolution",
+        "0.1",
+        "--layers",
+        layers,
+    ]);
+    map
+}
+
+#[test]
+fn pictures_by_layers_have_their_colors() {
+    use voxtile_render::classes::class_color;
+    let folder = TempDir::new().unwrap();
+    let (map, file) = (coloured_map(folder.path(), "colour,intensity,class"), folder.path().join("map.png"));
+    let count = |color: [u8; 3]| pixels_of(&file).2.iter().filter(|&&pixel| pixel == color).count();
+    let draw = |color: &str| {
+        json(&["picture", text(&map), "-o", text(&file), "--no-grid", "--json", "--color", color])
+    };
+    let printed = draw("rgb");
+    assert_eq!((printed["color"].as_str(), printed["range"].is_null()), (Some("rgb"), true));
+    let of_cell = printed["cell_px"].as_u64().unwrap().pow(2) as usize;
+    // Shading changes the colors at the borders of the box.
+    assert!(count([120, 80, 40]) > 1400 * of_cell && count([250, 20, 10]) >= 60 * of_cell);
+    let printed = draw("class");
+    assert_eq!(printed["classes"], serde_json::json!({"2": 1500, "6": 100}));
+    assert!(count(class_color(2)) > 1400 * of_cell && count(class_color(6)) >= 60 * of_cell);
+    let said = output(&["picture", text(&map), "-o", text(&file), "--color", "class"]);
+    assert!(said.contains("classes 2 ground, 6 building"), "{said}");
+    let range = draw("intensity")["range"].clone();
+    let ends = [0, 1].map(|k| range[k].as_f64().unwrap().round());
+    assert_eq!(ends, [30.0, 90.0]);
+    assert!(count(voxtile_render::colors::color_of(0.0)) > 1400 * of_cell);
+    assert!(draw("height")["classes"].is_null());
+    let (code, error) = failure(&["picture", text(&map), "-o", text(&file), "--color", "age"]);
+    assert!(code == 2 && error.contains("--color") && error.contains("--layers time"), "{error}");
+}
+
+#[test]
+fn a_report_has_pictures_in_color_and_a_table_of_classes() {
+    let folder = TempDir::new().unwrap();
+    let (map, file) = (coloured_map(folder.path(), "colour,class"), folder.path().join("page.html"));
+    let printed = json(&["report", text(&map), "-o", text(&file), "--json"]);
+    assert_eq!(printed["survey"]["classes"], serde_json::json!({"2": 1500, "6": 100}));
+    let page = fs::read_to_string(&file).unwrap();
+    check_markup(&page);
+    assert_eq!(page.matches("data:image/png;base64,").count(), 4);
+    let row = "<tr><td>2 ground</td><td class=\"number\">1,500</td><td class=\"number\">93.8 %</td></tr>";
+    assert!(
+        page.contains(row) && page.contains("<td>6 building</td>") && !page.contains("no class"),
+        "{page}"
+    );
+}
+
 #[test]
 fn hostile_names_are_escaped_in_a_report() {
     let folder = TempDir::new().unwrap();

@@ -263,6 +263,65 @@ fn the_server_shows_the_map() {
     assert!((beyond["hit"]["distance_m"].as_f64().unwrap() - 4.0).abs() < 0.2, "{beyond}");
 }
 
+/// The layer of a node follows its voxels; the page asks for it by name.
+#[test]
+fn layers_are_served_on_request() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut rows = String::from("x,y,z,r,g,b,class\n");
+    for (x, y) in (0..300).flat_map(|x| (0..30).map(move |y| (x, y))) {
+        let attributes = if x < 100 { "250,20,10,6" } else { "20,80,220,2" };
+        rows += &format!("{},{},0.05,{attributes}\n", 0.05 + 0.1 * f64::from(x), 0.05 + 0.1 * f64::from(y));
+    }
+    let (cloud, map) = (folder.path().join("floor.csv"), folder.path().join("coloured"));
+    fs::write(&cloud, rows).unwrap();
+    let options = ["--no-rays", "--resolution", "0.1", "-q"];
+    run(&[&["build", text(&cloud), "-o", text(&map), "--layers", "colour,class"][..], &options].concat());
+    let plain = folder.path().join("plain");
+    run(&[&["build", text(&cloud), "-o", text(&plain)][..], &options].concat());
+    let cache = folder.path().join("cache");
+    for _ in 0..2 {
+        let viewer = Viewer::ready(&[&map, &plain], &cache);
+        let maps = viewer.json("maps.json")["maps"].clone();
+        assert_eq!(
+            (&maps[0]["layers"], &maps[1]["layers"]),
+            (&serde_json::json!(["colour", "class"]), &Value::Null)
+        );
+        let legends = viewer.json("maps/0/layers.json");
+        let class = |class: u8, name: &str, voxels: u64| {
+            let color = voxtile_render::classes::class_color(class);
+            serde_json::json!({"class": class, "name": name, "color": color, "voxels": voxels})
+        };
+        let classes = [class(2, "ground", 6000), class(6, "building", 3000)];
+        assert_eq!(legends["class"]["classes"], serde_json::json!(classes));
+        assert!(legends["time"].is_null() && legends["colour"].is_object());
+        let mut levels = BTreeSet::new();
+        for path in viewer.nodes("0") {
+            let [bytes, plain] = ["&layer=colour", ""].map(|layer| {
+                let reply = viewer.get(&format!("{path}{layer}"));
+                assert!(reply.status == 200 && reply.head.contains("immutable"), "{path}{layer}");
+                reply.body
+            });
+            let count = u32::from_le_bytes(plain[4..8].try_into().unwrap()) as usize;
+            assert_eq!((plain[47], bytes[47]), (0, 1));
+            assert_eq!((&bytes[..47], &bytes[48..plain.len()]), (&plain[..47], &plain[48..]));
+            let planes = &bytes[plain.len()..];
+            assert_eq!(planes.len(), 4 * count);
+            // The border of the colours is that of two tiles, and of two voxels of the next two levels.
+            let colours: BTreeSet<_> =
+                (0..count).map(|k| [0, 1, 2, 3].map(|plane| planes[plane * count + k])).collect();
+            assert!(
+                colours.iter().all(|colour| [[250, 20, 10, 255], [20, 80, 220, 255]].contains(colour)),
+                "{colours:?}"
+            );
+            levels.insert(path.split('/').nth(3).unwrap().to_owned());
+        }
+        assert!(levels.len() > 1, "{levels:?}");
+        let path = viewer.nodes("1")[0].clone();
+        assert_eq!(viewer.get(&format!("{path}&layer=class")).status, 400);
+        assert_eq!(viewer.get(&format!("{path}&layer=nothing")).status, 404);
+    }
+}
+
 #[test]
 fn metrics_need_the_token_and_follow_the_map() {
     let (folder, map) = a_map();

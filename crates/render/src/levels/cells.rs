@@ -146,24 +146,9 @@ impl Cells {
     /// Adds the voxels of a child node. Each maps to one or two coarser voxels, which keep the maximum value. Call
     /// [`Cells::sort`] after the last child.
     pub(super) fn add_child(&mut self, scheme: Scheme, own: NodeKey, child: NodeKey, cells: &Self) {
-        let (from, first, edges) = (scheme.first_voxel(child), scheme.first_voxel(own), scheme.edges(own));
-        let width = 1 << child.level;
         for cell in &cells.cells {
-            let at = axes(cell.place);
-            let low = [0, 1, 2].map(|k| from[k] - first[k] + (at[k] << child.level));
-            // The fine voxel is in one coarser voxel, or in two if the tile's size is not a multiple of the coarser
-            // voxel's size.
-            let [xs, ys, zs] = [0, 1, 2].map(|k| {
-                let last = ((low[k] + width - 1) >> own.level).min(edges[k] - 1);
-                (low[k] >> own.level)..=last
-            });
-            for z in zs {
-                for y in ys.clone() {
-                    for x in xs.clone() {
-                        self.cells.push(Cell { place: place([x, y, z]), ..*cell });
-                    }
-                }
-            }
+            let coarser = scheme.coarser(own, child, axes(cell.place));
+            self.cells.extend(coarser.map(|at| Cell { place: place(at), ..*cell }));
         }
         self.cells = merged(std::mem::take(&mut self.cells));
         self.last_scan = self.last_scan.max(cells.last_scan);

@@ -1,4 +1,5 @@
 use super::cells::{Cells, Kind, Scale, axes};
+use super::layer_sums::{CollectedSums, LayerSums};
 use super::node_bytes::{self, Head};
 use super::node_key::{MAX_LEVEL, NodeKey};
 use super::node_store::{NodeStore, Stored};
@@ -30,10 +31,10 @@ use voxtile::{Error, Result};
 /// ```
 #[derive(Clone, Debug)]
 pub struct Levels {
-    config: MapConfig,
+    pub(super) config: MapConfig,
     pub(super) scheme: Scheme,
     /// Nodes at the level of tiles and coarser. Nodes without occupied voxels are included only if a sibling has some.
-    nodes: FxHashMap<NodeKey, Node>,
+    pub(super) nodes: FxHashMap<NodeKey, Node>,
     tops: Vec<NodeKey>,
     /// Bounds of all tiles.
     tile_box: Option<TileBox>,
@@ -125,7 +126,10 @@ impl Levels {
             level.retain(|(_, node)| node.is_occupied);
             let parents = parents_of(&level);
             let made = parents.par_iter().map(|&(key, node)| {
-                let stored = match store.find(key, node.version) {
+                let stored = match store
+                    .find(key, node.version)
+                    .filter(|_| levels.has_stored_layers(store, key, node))
+                {
                     Some(stored) => stored,
                     None => match levels.make(map, store, key, node, damaged)? {
                         Some(stored) => stored,
@@ -200,8 +204,8 @@ impl Levels {
         node: Node,
         damaged: &Mutex<Vec<(TileIndex, String)>>,
     ) -> std::result::Result<Option<Stored>, Stop> {
-        let cells = match self.pooled(map, store, key) {
-            Ok(cells) => Cells { last_scan: node.last_scan, ..cells },
+        let (cells, layers) = match self.pooled(map, store, key, self.has_layers()) {
+            Ok((cells, layers)) => (Cells { last_scan: node.last_scan, ..cells }, layers),
             Err(error @ Error::Damaged { tile: Some(tile), .. }) => {
                 damaged.lock().push((tile, format!("{error:#}")));
                 return Ok(None);
@@ -209,37 +213,70 @@ impl Levels {
             Err(error) => return Err(Stop::Failed(error)),
         };
         let bytes = node_bytes::encode(&self.head(key, Kind::Occupied), &cells);
+        if self.has_layers() {
+            self.store_layers(store, key, node, &layers).map_err(Stop::Failed)?;
+        }
         let bounds = cells.bounds().unwrap_or_default();
         let stored = store.put(key, node.version, &bytes, bounds, cells.cells.len() as u32);
         stored.map(Some).map_err(Stop::Failed)
     }
 
-    /// Computes the occupied voxels of a node from its children.
-    fn pooled<V: MapView>(&self, map: &V, store: &NodeStore, key: NodeKey) -> Result<Cells> {
-        let mut cells = Cells::default();
+    /// Computes the occupied voxels of a node from its children, and their layers if they are wanted.
+    fn pooled<V: MapView>(
+        &self,
+        map: &V,
+        store: &NodeStore,
+        key: NodeKey,
+        wants_layers: bool,
+    ) -> Result<(Cells, LayerSums)> {
+        let (mut cells, mut layers) = (Cells::default(), CollectedSums::default());
         for child in key.children() {
             if self.get(child).is_some_and(|node| node.is_occupied) {
-                cells.add_child(self.scheme, key, child, &self.cells(map, store, child)?);
+                let (of_child, layers_of_child) = self.content(map, store, child, wants_layers)?;
+                cells.add_child(self.scheme, key, child, &of_child);
+                layers.add_child(self.scheme, key, child, &layers_of_child);
             }
         }
-        Ok(cells)
+        Ok((cells, layers.finish()))
     }
 
     /// Returns the occupied voxels of a node.
     pub(super) fn cells<V: MapView>(&self, map: &V, store: &NodeStore, key: NodeKey) -> Result<Cells> {
+        Ok(self.content(map, store, key, false)?.0)
+    }
+
+    /// Returns the occupied voxels of a node, and their layers if they are wanted.
+    pub(super) fn content<V: MapView>(
+        &self,
+        map: &V,
+        store: &NodeStore,
+        key: NodeKey,
+        wants_layers: bool,
+    ) -> Result<(Cells, LayerSums)> {
         let tile = self.scheme.tile_of(key);
         let Some(node) = self.get(tile.map_or(key, |tile| self.scheme.key_of_tile(tile))) else {
-            return Ok(Cells::default());
+            return Ok(Default::default());
         };
         let store_of_key = tile.map_or(Some(store), |tile| Self::store_of_tile(map, store, tile));
         let kept = store_of_key.map(|store| store.get(key, node.version)).transpose()?.flatten();
-        match (kept.map(|bytes| node_bytes::decode(&bytes)), tile) {
-            (Some(Ok(cells)), _) => Ok(cells),
-            (_, Some(tile)) => self.cells_of_tile(map, key, tile, Kind::Occupied),
+        let kept_layers = match store_of_key {
+            Some(store) if wants_layers => self.stored_layers(store, key, node)?,
+            _ if wants_layers => None,
+            _ => Some(LayerSums::default()),
+        };
+        match (kept.map(|bytes| node_bytes::decode(&bytes)), kept_layers, tile) {
+            (Some(Ok(cells)), Some(layers), _) => Ok((cells, layers)),
+            (_, _, Some(tile)) => {
+                let Some(tile) = map.tile_uncached(tile)? else { return Ok(Default::default()) };
+                let cells =
+                    Cells::of_tile(self.scheme, key, &tile, &self.config, Kind::Occupied, node.last_scan);
+                let layers = wants_layers.then(|| LayerSums::of_tile(self.scheme, key, &tile, &self.config));
+                Ok((cells, layers.unwrap_or_default()))
+            }
             // The store lacks the node, or the stored bytes are damaged: build it again.
             _ => {
-                let cells = self.pooled(map, store, key)?;
-                Ok(Cells { last_scan: node.last_scan, ..cells })
+                let (cells, layers) = self.pooled(map, store, key, wants_layers)?;
+                Ok((Cells { last_scan: node.last_scan, ..cells }, layers))
             }
         }
     }
@@ -251,7 +288,7 @@ impl Levels {
     }
 
     /// Returns the store for nodes of a tile, or `None` for tiles without versions, such as those of OctoMap files.
-    fn store_of_tile<'s, V: MapView>(
+    pub(super) fn store_of_tile<'s, V: MapView>(
         map: &V,
         store: &'s NodeStore,
         tile: TileIndex,

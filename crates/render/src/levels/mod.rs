@@ -6,6 +6,7 @@
 //! Cells         voxels of a node; eight nodes become one of coarser          cells
 //!               voxels, each the maximum of its children (OctoMap's rule)
 //! node_bytes    encoding of cells                                            node_bytes
+//! LayerSums     sums of the layers of a node's voxels; values for viewers    layer_sums, layer_totals, layer_planes
 //! NodeStore     file of coarse nodes                                         node_store
 //! Levels        nodes of one state of a map, identified by the versions      levels
 //!               of their tiles, so that unchanged nodes are reused
@@ -18,6 +19,10 @@
 
 mod cells;
 mod difference;
+mod layer_planes;
+mod layer_sums;
+mod layer_totals;
+mod levels_layers;
 mod levels_of_map;
 mod node_bytes;
 mod node_key;
@@ -26,10 +31,13 @@ mod scheme;
 mod tileset;
 
 #[cfg(test)]
+mod layer_tests;
+#[cfg(test)]
 mod tests;
 
 pub use cells::Kind;
 pub use difference::Difference;
+pub use layer_totals::LayerTotals;
 pub use levels_of_map::Levels;
 pub use node_key::NodeKey;
 pub use node_store::NodeStore;

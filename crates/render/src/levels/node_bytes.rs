@@ -3,11 +3,13 @@
 //! ```text
 //!  0  [u8; 4] "VXN1"                 44  u16  voxels along the edge
 //!  4  u32     voxels, n              46  u8   0 occupied, 1 free, 2 unknown, 3 difference
-//!  8  [f64;3] lower corner, metres   47  u8   0
+//!  8  [f64;3] lower corner, metres   47  u8   layer: 0 none, 1 colour, 2 intensity, 3 class, 4 time
 //! 32  f64     edge of a voxel, m     48  f32  log-odds of value 0, and of 255, and of the map's threshold
 //! 40  u32     last scan              60  u32  0
 //! 64  x[n] y[n] z[n] value[n] count[n], one byte each; x, y and z as wrapping differences to the previous voxel
 //! ```
+//!
+//! The values of the layer follow (`layer_planes`).
 //!
 //! Little endian, compressed with gzip. Neighbours differ little, so a voxel takes about two bytes.
 
@@ -39,8 +41,13 @@ pub(super) struct Head {
 
 /// Returns the compressed bytes of a node.
 pub(super) fn encode(head: &Head, cells: &Cells) -> Vec<u8> {
+    encode_layered(head, cells, 0, &[])
+}
+
+/// Returns the compressed bytes of a node with the values of a layer, by its number.
+pub(super) fn encode_layered(head: &Head, cells: &Cells, layer: u8, values: &[u8]) -> Vec<u8> {
     let count = cells.cells.len();
-    let mut bytes = Vec::with_capacity(HEADER_BYTES + VOXEL_BYTES * count);
+    let mut bytes = Vec::with_capacity(HEADER_BYTES + VOXEL_BYTES * count + values.len());
     bytes.extend(MAGIC);
     bytes.extend((count as u32).to_le_bytes());
     bytes.extend(head.corner_m.map(f64::to_le_bytes).as_flattened());
@@ -48,7 +55,7 @@ pub(super) fn encode(head: &Head, cells: &Cells) -> Vec<u8> {
     let last_scan = u32::try_from(cells.last_scan).ok().filter(|&scan| scan > 0);
     bytes.extend(last_scan.unwrap_or(NO_SCAN).to_le_bytes());
     bytes.extend((head.edge as u16).to_le_bytes());
-    bytes.extend([head.kind, 0]);
+    bytes.extend([head.kind, layer]);
     for log_odds in [head.scale.least, head.scale.most, head.threshold] {
         bytes.extend((log_odds as f32).to_le_bytes());
     }
@@ -62,11 +69,12 @@ pub(super) fn encode(head: &Head, cells: &Cells) -> Vec<u8> {
     }
     bytes.extend(cells.cells.iter().map(|cell| cell.value));
     bytes.extend(cells.cells.iter().map(|cell| cell.count));
+    bytes.extend(values);
     let mut gzip = GzEncoder::new(Vec::with_capacity(bytes.len() / 4), Compression::new(6));
     gzip.write_all(&bytes).and_then(|()| gzip.finish()).unwrap_or_default()
 }
 
-/// Decodes the voxels from the bytes of [`encode`].
+/// Decodes the voxels from the bytes of [`encode`], which have no layer.
 pub(super) fn decode(compressed: &[u8]) -> io::Result<Cells> {
     let wrong = |reason| io::Error::new(io::ErrorKind::InvalidData, reason);
     let mut bytes = Vec::new();

@@ -61,6 +61,27 @@ impl Scheme {
         (key, own.map(|k| k % MAX_EDGE))
     }
 
+    /// Returns the voxels of a node that contain a voxel of a child: one, or more if the tile's size is not a multiple
+    /// of the coarser voxel's size.
+    pub(super) fn coarser(
+        self,
+        own: NodeKey,
+        child: NodeKey,
+        at: [i64; 3],
+    ) -> impl Iterator<Item = [i64; 3]> {
+        let (from, first, edges) = (self.first_voxel(child), self.first_voxel(own), self.edges(own));
+        let width = 1 << child.level;
+        let low = [0, 1, 2].map(|k| from[k] - first[k] + (at[k] << child.level));
+        let [xs, ys, zs] = [0, 1, 2].map(|k| {
+            let last = ((low[k] + width - 1) >> own.level).min(edges[k] - 1);
+            (low[k] >> own.level)..=last
+        });
+        zs.flat_map(move |z| {
+            let xs = xs.clone();
+            ys.clone().flat_map(move |y| xs.clone().map(move |x| [x, y, z]))
+        })
+    }
+
     /// Returns the lowest voxel of a node, in voxels of the map.
     pub(super) fn first_voxel(self, key: NodeKey) -> [i64; 3] {
         match self.tile_level.checked_sub(key.level) {

@@ -57,7 +57,7 @@ fn map_of(edge: i32, points: &[[f64; 3]]) -> InMemoryMapper {
     map
 }
 
-fn memory_store() -> NodeStore {
+pub(super) fn memory_store() -> NodeStore {
     NodeStore::open(Cursor::new(Vec::new()), "nodes").unwrap()
 }
 
@@ -85,7 +85,7 @@ fn voxels_of(
 }
 
 /// Returns all nodes that a viewer can reach through the tileset's files.
-fn reached(levels: &Levels, map: &InMemoryMapper, store: &NodeStore) -> Vec<NodeKey> {
+pub(super) fn reached(levels: &Levels, map: &InMemoryMapper, store: &NodeStore) -> Vec<NodeKey> {
     let nodes = LevelsOf { levels, map };
     let mut uris = BTreeSet::new();
     let mut open = vec![tileset(&nodes, store, TilesetContent::Voxels, 0.into()).unwrap()];

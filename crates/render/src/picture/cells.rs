@@ -1,4 +1,6 @@
+use super::layer_cells::LayerCells;
 use super::view::Change;
+use crate::Layer;
 use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
 
 /// Cells of a picture, written by any number of threads. Each cell keeps its highest rank, the highest value of this
@@ -6,6 +8,8 @@ use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
 pub(super) struct Cells {
     best: Vec<AtomicU64>,
     near: Vec<AtomicU32>,
+    /// Values of the layer that the picture shows.
+    pub layer: Option<LayerCells>,
 }
 
 /// Content of a cell after all writes.
@@ -56,8 +60,9 @@ impl Rank {
 }
 
 impl Cells {
-    pub fn new(count: usize) -> Self {
-        let mut cells = Self { best: Vec::new(), near: Vec::new() };
+    pub fn new(count: usize, layer: Option<Layer>) -> Self {
+        let layer = layer.map(|layer| LayerCells::new(layer, count));
+        let mut cells = Self { best: Vec::new(), near: Vec::new(), layer };
         cells.best.resize_with(count, Default::default);
         cells.near.resize_with(count, Default::default);
         cells
@@ -109,7 +114,7 @@ mod tests {
 
     #[test]
     fn the_highest_rank_counts_and_then_the_highest_value() {
-        let cells = Cells::new(2);
+        let cells = Cells::new(2, None);
         let cell = |rank, value, near| Cell { rank, value, near };
         for added in [
             cell(Rank::Occupied, -3.5, -7),

@@ -89,7 +89,7 @@ impl Collected {
         let mut known = None;
         if let Some(voxels) = collector.bounds(&tiles) {
             let frame = Frame::new(picture.view, voxels, picture.most_px);
-            let cells = Cells::new(frame.cells[0] * frame.cells[1]);
+            let cells = Cells::new(frame.cells[0] * frame.cells[1], None);
             let starts = |k: usize| (voxels.min[k]..voxels.end[k]).step_by(SQUARE_VOXELS as usize);
             let squares: Vec<[i32; 2]> = starts(0).flat_map(|x| starts(1).map(move |y| [x, y])).collect();
             for (number, [x, y]) in squares.iter().copied().enumerate() {
@@ -203,7 +203,11 @@ impl Collector<'_> {
 
     fn collect(&self, tiles: &[TileIndex], voxels: VoxelBox, progress: &Progress) -> Result<Option<Known>> {
         let frame = Frame::new(self.picture.view, voxels, self.picture.most_px);
-        let cells = Cells::new(frame.cells[0] * frame.cells[1]);
+        let layer = match self.picture.color_by {
+            ColorBy::Layer(layer) if matches!(self.source, Source::One(_)) => Some(layer),
+            _ => None,
+        };
+        let cells = Cells::new(frame.cells[0] * frame.cells[1], layer);
         let outcomes = tiles.par_iter().map(|&tile| {
             let added = match self.source {
                 Source::One(map) => self.add(map, tile, &frame, &cells),
@@ -242,9 +246,14 @@ impl Collector<'_> {
                 _ if !is_occupied => 0.0,
                 ColorBy::Height => ((f64::from(voxel.index[2]) + 0.5) * resolution_m) as f32,
                 ColorBy::Probability | ColorBy::Distance => evidence.probability() as f32,
+                ColorBy::Layer(_) => 0.0,
             };
             let rank = if is_occupied { Rank::Occupied } else { Rank::Free };
-            cells.add(frame.place_of(voxel.index), Cell { rank, value, near: view.nearness(voxel.index) });
+            let (place, near) = (frame.place_of(voxel.index), view.nearness(voxel.index));
+            cells.add(place, Cell { rank, value, near });
+            if let Some(layer) = cells.layer.as_ref().filter(|_| is_occupied) {
+                layer.add(place, near, || tile.layers_of(voxel.index));
+            }
         }
         Ok(())
     }

@@ -3,12 +3,18 @@ use super::cells::{Cell, Rank};
 use super::collect::{Collected, Known};
 use super::font;
 use super::image::Image;
-use super::legend::{Legend, Scale, legend_height};
+use super::layer_cells::LayerValue;
+use super::legend::{Entry, Legend, Scale, legend_height, moving_entry};
 use super::moving::Moving;
 use super::options::Picture;
 use super::palette::{self, Rgb, color_of, lit, mixed};
+use super::time_labels::short_time_labels;
 use super::view::{Change, ColorBy};
+use crate::Layer;
+use crate::classes::{class_color, class_label};
+use std::collections::BTreeMap;
 use voxtile::space::{Aabb, Grid, Point, TileIndex};
+use voxtile::{Layers, MapConfig};
 
 /// A picture with its scale and extent.
 #[derive(Clone, Debug)]
@@ -25,12 +31,17 @@ pub struct Drawn {
     pub cell_m: f64,
     /// Edge length of a cell in pixels.
     pub cell_px: usize,
-    /// Values of the first and the last color; `None` for a difference, and without occupied voxels.
+    /// Values of the first and the last color; times in seconds. `None` for a difference, for colors and classes, and
+    /// without occupied voxels.
     pub range: Option<[f64; 2]>,
     /// Number of cells with an occupied voxel, in either state for a difference.
     pub solid_cells: u64,
     /// Number of cells with an observed voxel.
     pub known_cells: u64,
+    /// Number of cells of each class, in ascending order; empty unless classes are shown.
+    pub classes: Vec<(u8, u64)>,
+    /// Number of cells with an occupied voxel but without a value of the layer that is shown.
+    pub cells_without_value: u64,
     /// Number of points on moving objects in the picture; `None` if [`Drawing::add_moving`] was not called.
     pub moving_points: Option<u64>,
     /// Number of tiles that were read.
@@ -53,6 +64,7 @@ pub(super) struct Pane {
 pub struct Drawing<'a> {
     picture: &'a Picture,
     grid: Grid,
+    layers: Layers,
     collected: Collected,
     range: Option<[f64; 2]>,
     moving: Option<Moving>,
@@ -62,6 +74,7 @@ pub struct Drawing<'a> {
 const MIN_WIDTH: usize = 760;
 /// Maximum size of a voxel in pixels, for small maps.
 const LARGEST_ZOOM: usize = 48;
+const SECONDS_A_NS: f64 = 1e-9;
 /// Size of an image without a map.
 const EMPTY_SIZE: [usize; 2] = [MIN_WIDTH, 240];
 
@@ -86,8 +99,9 @@ impl Pane {
 }
 
 impl<'a> Drawing<'a> {
-    pub(super) fn new(picture: &'a Picture, grid: Grid, collected: Collected) -> Self {
-        let mut drawing = Self { picture, grid, collected, range: None, moving: None };
+    pub(super) fn new(picture: &'a Picture, config: &MapConfig, collected: Collected) -> Self {
+        let (grid, layers) = (config.grid, config.layers());
+        let mut drawing = Self { picture, grid, layers, collected, range: None, moving: None };
         drawing.range = drawing.range();
         drawing
     }
@@ -108,7 +122,9 @@ impl<'a> Drawing<'a> {
         let most_px = self.picture.most_px;
         let zoom = (0..2).map(|k| most_px[k] / cells[k]).min().unwrap_or(1).clamp(1, LARGEST_ZOOM);
         let size = cells.map(|n| n * zoom);
-        let layout = Layout::of(self.picture, size, self.moving.is_some());
+        let (classes, cells_without_value) = self.counts(&known);
+        let entries = self.entries(&classes, cells_without_value);
+        let layout = Layout::of(self.picture, size, &entries);
         let pane = Pane { first, cells, zoom, left: layout.left, top: layout.top };
         let mut canvas = Canvas::new(layout.width, layout.height, palette::UNKNOWN);
         self.draw_cells(&mut canvas, &known, &pane);
@@ -129,8 +145,8 @@ impl<'a> Drawing<'a> {
                 lines_m,
                 axes: self.picture.view.axes(),
                 has_path: !self.picture.path.is_empty(),
-                moving_points: self.moving.as_ref().map(|moving| moving.points),
                 scale: self.scale(),
+                entries,
             };
             legend.draw(&mut canvas, layout.foot, layout.dot);
         }
@@ -146,6 +162,8 @@ impl<'a> Drawing<'a> {
             range: self.range.filter(|_| !self.collected.is_difference),
             solid_cells: count(Rank::Occupied),
             known_cells: count(Rank::Free),
+            classes,
+            cells_without_value,
             moving_points: self.moving.map(|moving| moving.points),
             tiles: self.collected.tiles,
             unread: self.collected.unread,
@@ -171,6 +189,8 @@ impl<'a> Drawing<'a> {
             range: None,
             solid_cells: 0,
             known_cells: 0,
+            classes: Vec::new(),
+            cells_without_value: 0,
             moving_points: self.moving.map(|moving| moving.points),
             tiles: self.collected.tiles,
             unread: self.collected.unread,
@@ -189,6 +209,65 @@ impl<'a> Drawing<'a> {
         }
     }
 
+    /// Returns the number of cells of each class, and of those without a value of the layer that is shown.
+    fn counts(&self, known: &Known) -> (Vec<(u8, u64)>, u64) {
+        let Some(layer) = &known.cells.layer else { return (Vec::new(), 0) };
+        let (mut classes, mut without) = (BTreeMap::new(), 0);
+        for (place, _) in known.cells.iter().enumerate().filter(|(_, cell)| cell.rank == Rank::Occupied) {
+            match layer.at(place) {
+                Some(LayerValue::Class(class)) => *classes.entry(class).or_default() += 1,
+                Some(_) => {}
+                None => without += 1,
+            }
+        }
+        (classes.into_iter().collect(), without)
+    }
+
+    /// Returns the entries of the legend.
+    fn entries(&self, classes: &[(u8, u64)], cells_without_value: u64) -> Vec<Entry> {
+        let class =
+            |&(class, _): &(u8, u64)| Entry { color: Some(class_color(class)), label: class_label(class) };
+        let mut entries: Vec<Entry> = classes.iter().map(class).collect();
+        if let (ColorBy::Layer(layer), 1..) = (self.picture.color_by, cells_without_value) {
+            let name = match layer {
+                Layer::Colour => "color",
+                layer => layer.name(),
+            };
+            entries.push(Entry { color: Some(palette::NO_VALUE), label: format!("no {name}") });
+        }
+        if let (ColorBy::Layer(Layer::Time), Some(range)) = (self.picture.color_by, self.range)
+            && let (_, Some(date)) = short_time_labels(range)
+        {
+            entries.push(Entry { color: None, label: format!("last hit: {date} utc") });
+        }
+        entries.extend(self.moving.as_ref().map(|moving| moving_entry(moving.points)));
+        entries
+    }
+
+    /// Returns a value of a layer as a number: an intensity in the unit of the points, a time in seconds.
+    fn number_of(&self, value: LayerValue) -> Option<f64> {
+        match value {
+            LayerValue::Intensity(share) => Some(share * f64::from(self.layers.intensity_max.unwrap_or(1.0))),
+            LayerValue::Time(ns) => Some(ns as f64 * SECONDS_A_NS),
+            LayerValue::Colour(_) | LayerValue::Class(_) => None,
+        }
+    }
+
+    /// Returns the range of a layer: from the 2nd to the 98th percentile of intensities, and of all times.
+    fn layer_range(&self, known: &Known) -> Option<[f64; 2]> {
+        let layer = known.cells.layer.as_ref()?;
+        let cells = known.cells.iter().enumerate().filter(|(_, cell)| cell.rank == Rank::Occupied);
+        let mut values: Vec<f64> =
+            cells.filter_map(|(place, _)| layer.at(place).and_then(|value| self.number_of(value))).collect();
+        values.sort_unstable_by(f64::total_cmp);
+        let (least, apart) = match self.picture.color_by {
+            ColorBy::Layer(Layer::Time) => (0, 1.0),
+            _ => (values.len() / 50, 1e-6 * f64::from(self.layers.intensity_max.unwrap_or(1.0))),
+        };
+        let most = values.len().checked_sub(1 + least)?;
+        Some([values[least], values[most].max(values[least] + apart)])
+    }
+
     /// Returns the values of the first and the last color. Up to 1 % of the cells at either end may be outside the
     /// range.
     ///
@@ -200,6 +279,7 @@ impl<'a> Drawing<'a> {
             ColorBy::Distance => return Some([0.0, self.collected.max_distance_m]),
             ColorBy::Height => Rank::Occupied,
             ColorBy::Count | ColorBy::LastScan => Rank::Free,
+            ColorBy::Layer(_) => return self.layer_range(known),
         };
         let cells = known.cells.iter().filter(|cell| cell.rank >= least);
         let mut values: Vec<f32> = cells.map(|cell| cell.value).collect();
@@ -213,7 +293,7 @@ impl<'a> Drawing<'a> {
         for up in pane.first[1]..pane.first[1] + pane.cells[1] {
             for across in pane.first[0]..pane.first[0] + pane.cells[0] {
                 let cell = known.cell([across, up]);
-                let Some(color) = self.color(cell) else { continue };
+                let Some(color) = self.color(known, [across, up], cell) else { continue };
                 let light =
                     if cell.rank.is_solid() { self.light(known, [across, up], cell.near) } else { 1.0 };
                 let [left, top] = pane.pixel([across, up]);
@@ -223,26 +303,34 @@ impl<'a> Drawing<'a> {
     }
 
     /// Returns the color of a cell before shading; `None` if it is unknown.
-    fn color(&self, cell: Cell) -> Option<Rgb> {
-        let value_color = || {
+    fn color(&self, known: &Known, at: [usize; 2], cell: Cell) -> Option<Rgb> {
+        let color_by_value = |value: f64| {
             let [least, most] = self.range.unwrap_or([0.0, 1.0]);
-            let value = f64::from(cell.value);
             color_of(match self.picture.color_by {
                 // Logarithmic: most voxels have few observations, some have very many.
                 ColorBy::Count => ((value + 1.0) / (least + 1.0)).ln() / ((most + 1.0) / (least + 1.0)).ln(),
                 _ => (value - least) / (most - least),
             })
         };
+        let value_color = || color_by_value(f64::from(cell.value));
         match cell.rank {
             Rank::Unknown => None,
             Rank::Changed(Change::Same) => Some(palette::SAME),
             Rank::Changed(Change::Vanished) => Some(palette::VANISHED),
             Rank::Changed(Change::Appeared) => Some(palette::APPEARED),
             Rank::Occupied if self.picture.color_by == ColorBy::Distance => Some(palette::INK),
-            Rank::Occupied => Some(value_color()),
+            Rank::Occupied => Some(match &known.cells.layer {
+                Some(layer) => match layer.at(known.place(at)) {
+                    Some(LayerValue::Colour(color)) => color,
+                    Some(LayerValue::Class(class)) => class_color(class),
+                    Some(value) => self.number_of(value).map_or(palette::NO_VALUE, color_by_value),
+                    None => palette::NO_VALUE,
+                },
+                None => value_color(),
+            }),
             Rank::Free => match self.picture.color_by {
                 _ if self.collected.is_difference => Some(palette::FREE),
-                ColorBy::Height | ColorBy::Probability => Some(palette::FREE),
+                ColorBy::Height | ColorBy::Probability | ColorBy::Layer(_) => Some(palette::FREE),
                 ColorBy::Distance => Some(value_color()),
                 ColorBy::Count | ColorBy::LastScan => Some(mixed(palette::UNKNOWN, value_color(), 0.4)),
             },
@@ -335,8 +423,12 @@ impl<'a> Drawing<'a> {
 }
 
 impl Known {
-    fn cell(&self, [across, up]: [usize; 2]) -> Cell {
-        self.cells.at(across + up * self.frame.cells[0])
+    fn place(&self, [across, up]: [usize; 2]) -> usize {
+        across + up * self.frame.cells[0]
+    }
+
+    fn cell(&self, at: [usize; 2]) -> Cell {
+        self.cells.at(self.place(at))
     }
 }
 
@@ -362,7 +454,7 @@ struct Layout {
 }
 
 impl Layout {
-    fn of(picture: &Picture, size: [usize; 2], has_moving: bool) -> Self {
+    fn of(picture: &Picture, size: [usize; 2], entries: &[Entry]) -> Self {
         if !picture.has_legend {
             let [width, height] = size;
             return Self { width, height, margin: 0, left: 0, top: 0, foot: height, dot: 1 };
@@ -373,7 +465,7 @@ impl Layout {
         let width = inner + 2 * margin;
         let top = 2 * margin + font::HEIGHT * dot;
         let foot = top + size[1] + margin;
-        let legend = legend_height(has_moving) * dot;
+        let legend = legend_height(entries, width, dot) * dot;
         Self { width, height: foot + legend + margin, margin, left: (width - size[0]) / 2, top, foot, dot }
     }
 }

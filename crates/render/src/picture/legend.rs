@@ -1,8 +1,10 @@
 use super::canvas::Canvas;
 use super::font;
-use super::palette::{self, color_of};
+use super::palette::{self, Rgb, color_of};
 use super::scale::{length_label, round_length_m};
+use super::time_labels::short_time_labels;
 use super::view::ColorBy;
+use crate::Layer;
 
 /// Legend below the map.
 pub struct Legend {
@@ -13,9 +15,15 @@ pub struct Legend {
     pub axes: [usize; 2],
     /// Whether the trajectory is drawn.
     pub has_path: bool,
-    /// Number of points on moving objects, if they are drawn.
-    pub moving_points: Option<u64>,
     pub scale: Scale,
+    /// Further colors with their meaning, in rows below the other parts.
+    pub entries: Vec<Entry>,
+}
+
+/// A color and its meaning, or a remark without a color.
+pub struct Entry {
+    pub color: Option<Rgb>,
+    pub label: String,
 }
 
 /// Meaning of the colors.
@@ -26,18 +34,49 @@ pub enum Scale {
     Change,
 }
 
-/// First row of the line of moving points, below the other parts of the legend, in dots.
-const MOVING_ROW: usize = 29;
+/// Top of the first row of entries, below the other parts of the legend, in dots.
+const FIRST_ROW: usize = 29;
+/// Distance between rows of entries, in dots.
+const ROW: usize = font::HEIGHT + 5;
 
-/// Returns the height of the legend in dots.
-pub fn legend_height(has_moving: bool) -> usize {
-    if has_moving { MOVING_ROW + font::HEIGHT + 2 } else { 24 }
+/// Returns the height of the legend of an image in dots.
+pub fn legend_height(entries: &[Entry], width: usize, dot: usize) -> usize {
+    match places_of(entries, width, dot).last() {
+        Some([_, top]) => top + font::HEIGHT + 2,
+        None => 24,
+    }
 }
+
+/// Returns the upper left corners of the entries in dots, in rows that fit the width of the image.
+fn places_of(entries: &[Entry], width: usize, dot: usize) -> Vec<[usize; 2]> {
+    let most = (width / dot).saturating_sub(MARGIN);
+    let (mut left, mut top) = (MARGIN, FIRST_ROW);
+    let place = |entry: &Entry| {
+        let width = SWATCH + font::width_of(&entry.label);
+        if left + width > most && left > MARGIN {
+            (left, top) = (MARGIN, top + ROW);
+        }
+        let place = [left, top];
+        left += width + 12;
+        place
+    };
+    entries.iter().map(place).collect()
+}
+
+/// Returns the entry of points on moving objects.
+pub fn moving_entry(points: u64) -> Entry {
+    Entry { color: Some(palette::MOVING), label: format!("moving points: {}", grouped(points)) }
+}
+
+/// Space at both sides of the legend, in dots.
+const MARGIN: usize = 10;
+/// Distance from the left border of a swatch to its label, in dots.
+const SWATCH: usize = 11;
 
 impl Legend {
     /// Draws the legend below the row `foot` with dots of `dot` pixels: axes, scale bar, free and unknown, colors.
     pub fn draw(&self, canvas: &mut Canvas, foot: usize, dot: usize) {
-        let margin = 10 * dot;
+        let margin = MARGIN * dot;
         let bottom = foot + 22 * dot;
         let line = bottom - font::HEIGHT * dot;
         // Axes.
@@ -85,9 +124,12 @@ impl Legend {
             canvas.path(std::iter::once([sensor + 3 * dot, top + 3 * dot]), dot + 1, color);
             canvas.text(sensor + 11 * dot, top, dot, palette::FAINT_INK, "sensor");
         }
-        if let Some(points) = self.moving_points {
-            let label = format!("moving points: {}", grouped(points));
-            draw_swatch(canvas, [margin, foot + MOVING_ROW * dot], dot, palette::MOVING, &label);
+        for (entry, [left, row]) in self.entries.iter().zip(places_of(&self.entries, canvas.width(), dot)) {
+            let place = [left * dot, foot + row * dot];
+            match entry.color {
+                Some(color) => draw_swatch(canvas, place, dot, color, &entry.label),
+                None => canvas.text(place[0], place[1], dot, palette::FAINT_INK, &entry.label),
+            }
         }
     }
 
@@ -100,7 +142,15 @@ impl Legend {
             draw_swatch(canvas, [left + 68 * dot, top], dot, palette::SAME, "same");
             return;
         };
-        let Some(range) = *range else { return };
+        let Some(range) = *range else {
+            let name = match color_by {
+                ColorBy::Layer(Layer::Colour) => "mean color of the points",
+                ColorBy::Layer(Layer::Class) => "class",
+                _ => return,
+            };
+            canvas.text_before(right, top, dot, palette::FAINT_INK, name);
+            return;
+        };
         for x in 0..bar {
             let color = color_of(x as f64 / (bar - 1).max(1) as f64);
             canvas.fill(right - bar + x, bottom - 7 * dot, [1, 7 * dot], color, 1.0);
@@ -136,6 +186,12 @@ fn labels(color_by: ColorBy, [least, most]: [f64; 2]) -> (&'static str, [String;
         ColorBy::Count => ("count", [least, most].map(|value| format!("{value:.0}"))),
         ColorBy::LastScan => ("last scan", [least, most].map(|value| format!("{value:.0}"))),
         ColorBy::Distance => ("distance", [least, most].map(|value| format!("{value} m"))),
+        ColorBy::Layer(Layer::Time) => match short_time_labels([least, most]) {
+            (labels, None) => ("last hit", labels),
+            // The rest of the dates is an entry with this name.
+            (labels, Some(_)) => ("", labels),
+        },
+        ColorBy::Layer(layer) => (layer.name(), [least, most].map(|value| number_label(value, most - least))),
     }
 }
 
@@ -148,7 +204,7 @@ fn needed_width(name: &str, ends: [&str; 2], dot: usize) -> usize {
 fn draw_swatch(canvas: &mut Canvas, [left, top]: [usize; 2], dot: usize, color: palette::Rgb, label: &str) {
     canvas.fill(left, top, [7 * dot; 2], palette::FAINT_INK, 1.0);
     canvas.fill(left + 1, top + 1, [7 * dot - 2; 2], color, 1.0);
-    canvas.text(left + 11 * dot, top, dot, palette::FAINT_INK, label);
+    canvas.text(left + SWATCH * dot, top, dot, palette::FAINT_INK, label);
 }
 
 fn name_of(axis: usize) -> &'static str {
@@ -166,6 +222,12 @@ fn grouped(number: u64) -> String {
         text.push(digit);
     }
     text
+}
+
+/// Formats a value with two or three digits of its range.
+fn number_label(value: f64, range: f64) -> String {
+    let digits = (2.0 - range.max(1e-9).log10().floor()).clamp(0.0, 9.0) as usize;
+    format!("{value:.digits$}")
 }
 
 fn height_label(height_m: f64) -> String {
@@ -189,12 +251,30 @@ mod tests {
     }
 
     #[test]
+    fn numbers_have_the_digits_of_their_range() {
+        assert_eq!([number_label(17.26, 200.0), number_label(1.234, 0.5)], ["17", "1.234"]);
+        assert_eq!(number_label(0.0, 0.0), "0.000000000");
+    }
+
+    #[test]
+    fn entries_fill_rows() {
+        let entry = |label: &str| Entry { color: Some([0; 3]), label: label.to_owned() };
+        let entries = ["2 ground", "6 building", "5 high vegetation", "9 water"].map(entry);
+        let places = places_of(&entries, 400, 2);
+        assert_eq!((places[0], places[2][1]), ([MARGIN, FIRST_ROW], FIRST_ROW + ROW));
+        for (entry, [left, _]) in entries.iter().zip(&places) {
+            assert!(left + SWATCH + font::width_of(&entry.label) <= 190);
+        }
+        assert_eq!(legend_height(&entries, 400, 2), places[3][1] + 9);
+        assert_eq!(places_of(&entries, 10, 2).len(), 4);
+    }
+
+    #[test]
     fn a_name_and_its_values_do_not_overlap() {
         for (width, dot, is_named) in [(2000, 2, true), (600, 2, true), (600, 3, false), (240, 2, false)] {
             let scale = Scale::Values { color_by: ColorBy::Height, range: Some([-12.5, 108.6]) };
-            let (lines_m, has_path, moving_points) = (None, false, None);
-            let legend =
-                Legend { metres_a_pixel: 0.1, lines_m, axes: [0, 2], has_path, moving_points, scale };
+            let (lines_m, has_path, entries) = (None, false, Vec::new());
+            let legend = Legend { metres_a_pixel: 0.1, lines_m, axes: [0, 2], has_path, scale, entries };
             let bar = legend.bar_width(width, dot);
             assert!(bar <= width / 2);
             assert_eq!(bar >= needed_width("height", ["-12.5 m", "108.6 m"], dot), is_named, "{width}");

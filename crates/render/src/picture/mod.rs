@@ -3,8 +3,8 @@
 //! ```text
 //! Picture   options                                            options, view
 //! Frame     voxels of each cell                                frame
-//! Cells     the best observation of each cell                  cells, collect
-//! Drawing   cells, grid, moving points, trajectory, legend     drawing, moving, legend, scale
+//! Cells     the best observation of each cell                  cells, layer_cells, collect
+//! Drawing   cells, grid, moving points, trajectory, legend     drawing, moving, legend, scale, time_labels
 //! Canvas    pixels, boxes, letters                             canvas, font, palette, image
 //! OverTime  panels of a local map at several times             over_time
 //! ```
@@ -16,21 +16,27 @@ mod drawing;
 mod font;
 mod frame;
 mod image;
+mod layer_cells;
 mod legend;
 mod moving;
 mod options;
 mod over_time;
 mod palette;
 mod scale;
+mod time_labels;
 mod view;
 
 pub use drawing::{Drawing, Drawn};
 pub use image::Image;
 pub use options::Picture;
 pub use over_time::{OverTime, Panel};
+pub use time_labels::{is_unix_time, time_labels};
 pub use view::{Change, ColorBy, SideAxis, View};
 
 /// Colors of pictures, as red, green and blue in sRGB.
 pub mod colors {
-    pub use super::palette::{APPEARED, FREE, MOVING, PATH, Rgb, SAME, UNKNOWN, VANISHED, color_of};
+    pub(crate) use super::palette::vivid;
+    pub use super::palette::{
+        APPEARED, FREE, MOVING, NO_VALUE, PATH, Rgb, SAME, UNKNOWN, VANISHED, color_of,
+    };
 }

@@ -8,7 +8,8 @@ use voxtile_distance::DistanceOptions;
 
 /// Options of a picture of a map.
 ///
-/// Memory: 12 bytes per cell (13 with moving points), 4 per pixel, and one tile per thread, whatever the size of the map.
+/// Memory: 12 bytes per cell (44 with the colors of a layer, one more with moving points), 4 per pixel, and one tile
+/// per thread, whatever the size of the map.
 #[derive(Clone, Debug)]
 pub struct Picture {
     pub(super) view: View,
@@ -119,8 +120,11 @@ impl Picture {
             let reason = "the map does not record the last scan of its tiles; color by something else";
             return Err(Error::argument("color", reason));
         }
+        if let ColorBy::Layer(layer) = self.color_by {
+            layer.check(&map.config().layers())?;
+        }
         let collected = Collected::of(self, Source::One(map), &progress)?;
-        Ok(Drawing::new(self, map.config().grid, collected))
+        Ok(Drawing::new(self, map.config(), collected))
     }
 
     /// Draws the difference of two maps or states of a map: voxels occupied in both, only before, or only after, in
@@ -159,7 +163,7 @@ impl Picture {
             return Err(Error::argument("the map before", reason));
         }
         let collected = Collected::of(self, Source::Two { before, after }, &progress)?;
-        Ok(Drawing::new(self, grid, collected))
+        Ok(Drawing::new(self, after.config(), collected))
     }
 
     /// Computes the distances of a layer of voxels to the nearest obstacle, and returns their drawing. The view must be
@@ -181,7 +185,7 @@ impl Picture {
             return Err(Error::argument("view", "distances are drawn of a slice"));
         }
         let collected = Collected::of_distances(self, map, options, &progress)?;
-        Ok(Drawing::new(self, map.config().grid, collected))
+        Ok(Drawing::new(self, map.config(), collected))
     }
 
     fn check(&self) -> Result<()> {

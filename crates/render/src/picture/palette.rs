@@ -8,7 +8,7 @@ pub const UNKNOWN: Rgb = [13, 16, 22];
 /// Free space.
 pub const FREE: Rgb = [36, 43, 54];
 /// Inflated space: gray, unlike any height, and distinct from the background.
-pub(super) const INFLATED: Rgb = [92, 98, 108];
+pub(super) const INFLATED: Rgb = NO_VALUE;
 /// Letters and bars.
 pub(super) const INK: Rgb = [226, 230, 236];
 /// Secondary text.
@@ -23,6 +23,9 @@ pub const SAME: Rgb = [118, 124, 134];
 pub const VANISHED: Rgb = [255, 153, 31];
 /// Occupied only after.
 pub const APPEARED: Rgb = [74, 144, 255];
+
+/// Occupied voxels without a value of the layer that is shown.
+pub const NO_VALUE: Rgb = [92, 98, 108];
 
 /// Points of scans on moving objects, drawn with a light rim. No other color is similar, also with color blindness.
 pub const MOVING: Rgb = [190, 18, 24];
@@ -51,7 +54,7 @@ pub fn color_of(share: f64) -> Rgb {
 }
 
 /// Returns the most vivid color in sRGB, up to [`CHROMA`].
-fn vivid(lightness: f64, hue: f64) -> Rgb {
+pub(crate) fn vivid(lightness: f64, hue: f64) -> Rgb {
     let (mut low, mut high) = (0.0, CHROMA);
     for _ in 0..20 {
         let middle = 0.5 * (low + high);

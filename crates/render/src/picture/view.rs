@@ -1,3 +1,4 @@
+use crate::Layer;
 use voxtile::space::VoxelIndex;
 
 /// Viewing direction.
@@ -40,6 +41,8 @@ pub enum ColorBy {
     Count,
     /// Number of the last scan in the tile's latest flush.
     LastScan,
+    /// Layer of the topmost occupied voxel; of a map that has this layer.
+    Layer(Layer),
     /// Distance of free voxels to the nearest obstacle; obstacles are light. Only with
     /// [`Picture::start_distances`](crate::Picture::start_distances).
     Distance,

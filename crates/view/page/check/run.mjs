@@ -269,6 +269,83 @@ try {
   assert.deepEqual(browser.errors, []);
   step(`distances at a height: ${layerPixels.join(', ')} pixels; they follow a build`);
 
+  // Two scans from above of a floor, green and ground; a box, red and a building; and points without attributes.
+  const painted = (start) => {
+    const folder = join(work, `painted${start}`);
+    mkdirSync(folder);
+    for (const number of [0, 1]) {
+      const rows = ['x,y,z,intensity,r,g,b,class'];
+      for (let k = 0; k < 40; k++) for (let j = 0; j < 40; j++) {
+        const isBox = k >= 10 && k < 20 && j >= 10 && j < 20;
+        const point = [0.05 + 0.1 * k, 0.05 + 0.1 * j, (isBox ? 1.05 : 0.05) - 5];
+        // The second scan sees half of the floor.
+        if (number === 0 || k >= 20) rows.push([...point, ...(isBox ? [90, 220, 40, 30, 6] : [30, 30, 160, 60, 2])].map((value) => +Number(value).toFixed(3)).join(','));
+      }
+      // The name has the time stamp.
+      writeFileSync(join(folder, `${start + 100 * number}.000000.csv`), rows.join('\n'));
+    }
+    writeFileSync(join(folder, 'poses_tum.txt'), [0, 1].map((k) => `${start + 100 * k} 0 0 5 0 0 0 1\n`).join(''));
+    return folder;
+  };
+  const layered = join(work, 'layered');
+  run('build', painted(1317042272), '-o', layered, '--resolution', '0.1', '--layers', 'colour,intensity,class,time', '--poses', join(work, 'painted1317042272/poses_tum.txt'), '-q');
+  const plain = server;
+  await browser.size(960, 640);
+  await browser.open('about:blank');
+  await browser.open(await view(layered, map));
+  server = plain;
+  await browser.ready();
+  const requested = () => browser.value('performance.getEntriesByType("resource").filter(({ name }) => name.includes("layer")).length');
+  const options = () => browser.value('[...document.getElementById("colour").options].map(({ value }) => value)');
+  assert.deepEqual(await options(), ['height', 'probability', 'count', 'scan', 'rgb', 'intensity', 'class', 'age']);
+  assert.equal(await requested(), 0, 'values of layers are loaded only if they are shown');
+  await browser.value('document.getElementById("layers").querySelectorAll("input")[1].click(); voxtile.lookAt([2, 2, 6], [2, 2.001, 0])');
+  const nearPixels = (colour) => count(`(r, g, b) => Math.hypot(r - ${colour[0]}, g - ${colour[1]}, b - ${colour[2]}) < 12`);
+  const colourBy = async (name) => {
+    await browser.value(`document.getElementById('colour').value = '${name}'; document.getElementById('colour').dispatchEvent(new Event('change'))`);
+    await browser.until(`voxtile.painted() === '${name}' && document.getElementById('state').textContent === 'ready'`, 30);
+    return browser.value('[document.getElementById("legend-classes"), document.getElementById("legend-ends")].map(({ innerText }) => innerText.replace(/\\s+/g, " ")).join("|")');
+  };
+  const pixelsOf = async (...colours) => {
+    const found = [];
+    for (const colour of colours) found.push(await nearPixels(colour));
+    return found;
+  };
+  await colourBy('rgb');
+  const byColour = await pixelsOf([30, 160, 60], [220, 40, 30]);
+  assert.ok(byColour[0] > 20000 && byColour[1] > 2000, `${byColour} pixels in colour`);
+  assert.match(await colourBy('class'), /2 ground 1,500 6 building 100/);
+  const byClass = await pixelsOf([166, 124, 82], [236, 126, 84]);
+  assert.ok(byClass[0] > 20000 && byClass[1] > 2000, `${byClass} pixels by class`);
+  assert.match(await colourBy('intensity'), /30 90/);
+  const byIntensity = await pixelsOf([38, 13, 74], [252, 232, 66]);
+  assert.ok(byIntensity[0] > 20000 && byIntensity[1] > 2000, `${byIntensity} pixels by intensity`);
+  assert.match(await colourBy('age'), /2011-09-26 13:04:32 13:06:12/);
+  const byAge = await pixelsOf([38, 13, 74], [252, 232, 66]);
+  assert.ok(byAge[0] > 10000 && byAge[1] > 10000, `${byAge} pixels by age`);
+  await browser.value('voxtile.clickAt(...voxtile.screenOf([1.55, 1.55, 1.1]))');
+  await browser.until('/6 building: 1/.test(document.getElementById("answer").innerText)', 10);
+  const said = await browser.value('document.getElementById("answer").innerText.replace(/\\s+/g, " ")');
+  assert.match(said, /hits 1 colour 220 40 30 intensity 90.0 ± 0.0 class 6 building: 1 first hit 2011-09-26 13:04:32/);
+  await colourBy('rgb');
+  run('snapshot', layered, 'before');
+  run('build', painted(1317042572), '-o', layered, '--append', '--again', '--poses', join(work, 'painted1317042572/poses_tum.txt'), '-q');
+  await browser.until('voxtile.generation[0] > 1');
+  await browser.ready();
+  assert.match(await colourBy('age'), /2011-09-26 13:04:32 13:11:12/);
+  await browser.value(`document.getElementById('snapshot').value = 'before'; document.getElementById('snapshot').dispatchEvent(new Event('change'))`);
+  await browser.until('/13:06:12/.test(document.getElementById("legend-ends").innerText)', 30);
+  await browser.ready();
+  assert.ok((await pixelsOf([38, 13, 74]))[0] > 10000, 'the snapshot has its own times');
+  await browser.value(`document.getElementById('snapshot').value = ''; document.getElementById('snapshot').dispatchEvent(new Event('change'))`);
+  await colourBy('height');
+  assert.deepEqual(browser.errors, []);
+  step(`layers: ${byColour} pixels in colour, ${byClass} by class, ${byIntensity} by intensity, ${byAge} by age; they follow a build and a snapshot`);
+  await browser.open('about:blank');
+  await browser.open(url);
+  await browser.ready();
+  assert.deepEqual(await options(), ['height', 'probability', 'count', 'scan']);
+
   for (const [width, height, dark] of [[360, 640, false], [1280, 720, true]]) {
     await browser.size(width, height, dark);
     await browser.ready();

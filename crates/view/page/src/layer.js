@@ -1,5 +1,6 @@
 import * as THREE from 'three';
 import { FAILED, TilesRenderer } from '3d-tiles-renderer';
+import { BY_LAYER } from './layers.js';
 import { KIND, parseNode } from './node.js';
 import { bytesOf, meshOf } from './mesh.js';
 import { makeMaterial, tintLayer } from './material.js';
@@ -16,8 +17,9 @@ const LAST_RETRY_MS = 60000;
 
 // One state of a map; nodes are loaded and removed as the camera moves.
 export class Layer {
-  constructor(viewer, map, id, hue) {
-    Object.assign(this, { viewer, map, id, hue });
+  // `legend` is that of the layer by which the voxels are coloured; none before it is loaded.
+  constructor(viewer, map, id, hue, legend) {
+    Object.assign(this, { viewer, map, id, hue, legend });
     this.group = new THREE.Group();
     this.near = new THREE.Group();
     this.group.add(this.near);
@@ -38,13 +40,16 @@ export class Layer {
 
   open() {
     const tiles = new TilesRenderer(`maps/${this.id}/tileset.json`);
+    const { legend } = this;
+    tiles.layerName = legend && this.layerName;
     tiles.errorTarget = BEST_ERROR;
     tiles.registerPlugin({
+      preprocessURL: (url) => (tiles.layerName && url.includes('.vox?') ? `${url}&layer=${tiles.layerName}` : url),
       parseToMesh: (buffer, tile, extension) => {
         if (extension !== 'vox') return null;
         const node = parseNode(buffer);
         this.scale = { least: node.least, most: node.most };
-        const mesh = meshOf(node, this.material);
+        const mesh = meshOf(node, this.material, legend);
         const group = new THREE.Group();
         group.add(mesh);
         group.userData.mesh = mesh;
@@ -62,6 +67,22 @@ export class Layer {
     tiles.addEventListener('needs-update', () => this.viewer.wake());
     this.group.add(tiles.group);
     return tiles;
+  }
+
+  // The layer whose values the voxels need; none for changes, and for maps without it.
+  get layerName() {
+    const name = BY_LAYER[this.viewer.colour];
+    return this.id.includes('~') || !this.map.layers?.includes(name) ? null : name;
+  }
+
+  // Loads the voxels with the values of another layer, or with another legend.
+  paintBy(legend) {
+    const coloursOf = (one) => JSON.stringify(one && [one.range, one.classes.map((each) => each.class)]);
+    const isSame = coloursOf(this.legend) === coloursOf(legend);
+    this.legend = legend;
+    const { layerName } = this.next ?? this.tiles;
+    // Voxels with unused values are kept.
+    if (this.layerName && (layerName !== this.layerName || !isSame)) this.refresh();
   }
 
   // Handles a failed request of a tile, or of the root if there is no tile.

@@ -1,6 +1,7 @@
 // Controls of the page.
 
 import { coloursOf, readDistances } from './distances.js';
+import { BY_LAYER, NO_VALUE, className, endsOf, joined, timeText } from './layers.js';
 import { readLink, writeLink } from './link.js';
 import { logOddsOf, observationsOf, probabilityOf } from './node.js';
 import { pointMaterial } from './material.js';
@@ -40,6 +41,12 @@ let maps = [];
 let tool = 'query';
 let marks = [];
 let answered = null;
+// Legend of the layer by which voxels are coloured, and the number of the last request for it.
+let legend = null;
+let legendNumber = 0;
+let legendShown = 0;
+// Number of the last choice of states to show.
+let shownNumber = 0;
 let path = [];
 let pathNumber = 0;
 // Marked points of the first map that were loaded last, and the number of the last request for them.
@@ -51,6 +58,8 @@ let distancesRequest = null;
 let distancesTimer = 0;
 // Voxels that the camera may move before distances around another place are loaded; the layer has 1024.
 const DISTANCES_STEP = 256;
+const COLOURS = [['height', 'height'], ['probability', 'probability'], ['count', 'observations'], ['scan', "tile's last scan"],
+  ['rgb', 'colour'], ['intensity', 'intensity'], ['class', 'class'], ['age', 'last hit']];
 // Sliders of the cut, and their positions without a cut.
 const CUTS = ['x0', 'x1', 'y0', 'y1', 'z0', 'z1'];
 const OPEN = ['0', '1000', '0', '1000', '0', '1000'];
@@ -67,7 +76,7 @@ function answer(rows) {
   $('answer').replaceChildren(...rows.flatMap(([name, value]) => {
     const [dt, dd] = [document.createElement('dt'), document.createElement('dd')];
     dt.textContent = name;
-    dd.textContent = value;
+    dd.append(value);
     return [dt, dd];
   }));
 }
@@ -85,16 +94,18 @@ function describe() {
       viewer.layers[k].isShown = box.checked;
       viewer.wake();
     });
-    const swatch = document.createElement('span');
-    swatch.className = 'swatch';
-    swatch.style.background = `rgb(${LAYERS[k % LAYERS.length]})`;
-    label.append(box, ' ', swatch, one.name);
+    label.append(box, ' ', swatchOf(LAYERS[k % LAYERS.length]), one.name);
     return label;
   }));
   for (const [id, first] of [['snapshot', 'current'], ['since', 'none']]) {
     const chosen = $(id).value;
     $(id).replaceChildren(new Option(first, ''), ...map.snapshots.map(({ name }) => new Option(name, name)));
     $(id).value = map.snapshots.some(({ name }) => name === chosen) ? chosen : '';
+  }
+  // A map has the same layers from its creation on.
+  if ($('colour').options.length === 0) {
+    const has = ([value]) => !BY_LAYER[value] || maps.some(({ layers }) => layers?.includes(BY_LAYER[value]));
+    $('colour').replaceChildren(...COLOURS.filter(has).map(([value, text]) => new Option(text, value)));
   }
   const tiles = map.tiles.toLocaleString('en');
   const lost = map.unreadable?.length ? `, ${map.unreadable.length} damaged` : '';
@@ -127,14 +138,24 @@ async function readExtents() {
   }));
 }
 
-function showMaps() {
+async function showMaps() {
+  const number = ++shownNumber;
+  const shown = maps.map((map) => ({ map, id: idOf(map) }));
+  viewer.colour = $('colour').value;
+  const found = BY_LAYER[viewer.colour] ? await legendOf(shown) : null;
+  // Another state was chosen in the meantime.
+  if (number !== shownNumber) return;
+  legend = found;
   viewer.scaled = false;
-  viewer.show(maps.map((map) => ({ map, id: idOf(map) })));
+  viewer.show(shown, legend);
   viewer.layers.forEach((layer, k) => { layer.isShown = $('layers').querySelectorAll('input')[k]?.checked ?? true; });
   paint();
+  if (!legend) loadLegend();
   readPath();
   loadMoving();
   loadDistances();
+  // Flushes in the meantime.
+  catchUp();
 }
 
 async function readPath() {
@@ -264,6 +285,67 @@ function followCamera() {
 
 // --- Colours and cuts
 
+const swatchOf = (colour) => {
+  const swatch = document.createElement('span');
+  swatch.className = 'swatch';
+  swatch.style.background = `rgb(${colour})`;
+  return swatch;
+};
+
+// Returns the joined legend of the chosen layer, of all maps that have it; `null` if it cannot be loaded.
+async function legendOf(shown) {
+  const name = BY_LAYER[$('colour').value];
+  const ids = shown.filter(({ map, id }) => map.layers?.includes(name) && !id.includes('~')).map(({ id }) => id);
+  try {
+    return joined(await Promise.all(ids.map(async (id) => (await json(`maps/${id}/layers.json`))[name])));
+  } catch (error) {
+    say(`Cannot load the legend: ${error.message}`);
+    return null;
+  }
+}
+
+// Loads the legend of the chosen layer, and then the voxels in its colours, except of layers that the caller refreshes.
+async function loadLegend(refreshed = []) {
+  const number = ++legendNumber;
+  if (!BY_LAYER[$('colour').value]) {
+    legend = null;
+    legendShown = number;
+    return;
+  }
+  const found = await legendOf(viewer.layers);
+  if (number !== legendNumber) return;
+  if (!found) {
+    setTimeout(() => { if (number === legendNumber) loadLegend(); }, RETRY_MS);
+    return;
+  }
+  legend = found;
+  for (const layer of viewer.layers) {
+    if (refreshed.includes(layer)) layer.legend = legend;
+    else layer.paintBy(legend);
+  }
+  legendShown = number;
+  paint();
+}
+
+function paintLegend() {
+  const choice = $('colour').value;
+  const isClass = choice === 'class';
+  const rows = (isClass ? legend?.classes ?? [] : []).map((one) => {
+    const [row, text, count] = ['li', 'span', 'span'].map((tag) => document.createElement(tag));
+    [text.textContent, count.textContent] = [className(one), one.voxels.toLocaleString('en')];
+    row.append(swatchOf(one.color), text, count);
+    return row;
+  });
+  if (BY_LAYER[choice]) {
+    const row = document.createElement('li');
+    row.append(swatchOf(NO_VALUE), choice === 'rgb' ? 'no colour' : 'no value');
+    rows.push(row);
+  }
+  $('legend-classes').replaceChildren(...rows);
+  $('legend-classes').hidden = rows.length === 0;
+  return endsOf(choice, legend);
+}
+
 function paint() {
   viewer.colour = $('colour').value;
   viewer.threshold = Number($('threshold').value);
@@ -276,14 +358,13 @@ function paint() {
     probability: [0, 255].map((value) => probabilityOf(logOddsOf(scale, value)).toFixed(2)),
     count: ['1', `${observationsOf(128)}+`],
     scan: ['1', String(map.scans ?? 1)],
-  }[viewer.colour];
-  $('legend').hidden = isChange;
+  }[viewer.colour] ?? paintLegend();
+  if (isChange || !BY_LAYER[viewer.colour]) $('legend-classes').hidden = true;
+  $('legend').hidden = isChange || ['rgb', 'class'].includes(viewer.colour);
   if (isChange) {
     const names = ['appeared', 'vanished', 'unchanged'].map((name, k) => {
-      const [span, swatch] = [document.createElement('span'), document.createElement('span')];
-      swatch.className = 'swatch';
-      swatch.style.background = `rgb(${CHANGES[k]})`;
-      span.append(swatch, name);
+      const span = document.createElement('span');
+      span.append(swatchOf(CHANGES[k]), name);
       return span;
     });
     $('legend-ends').replaceChildren(...names);
@@ -344,6 +425,7 @@ async function ask(layer, node, center) {
       ['log-odds', number(result.log_odds, 4)],
       ['observations', result.observation_count === null ? 'none' : `${result.observation_count}`],
       ['tile', result.tile?.join(' ') ?? 'none'],
+      ...await layerRows(layer, result.layers),
     ]);
     $('copy').hidden = false;
     return answered;
@@ -351,6 +433,30 @@ async function ask(layer, node, center) {
     say(`The request failed: ${error.message}`);
     return null;
   }
+}
+
+// Rows on the layers of a voxel.
+async function layerRows(layer, found) {
+  if (!found) return [];
+  const of = async (name) => (await json(`maps/${layer.id.split('~')[0]}/layers.json`).catch(() => ({})))[name];
+  const rows = [['hits', String(found.points)]];
+  if (found.colour) {
+    const value = document.createElement('span');
+    value.append(swatchOf(found.colour), found.colour.join(' '));
+    rows.push(['colour', value]);
+  }
+  if (found.intensity !== undefined) rows.push(['intensity', `${found.intensity.toFixed(1)} ± ${found.intensity_deviation.toFixed(1)}`]);
+  const classes = Object.entries(found.classes ?? {});
+  if (classes.length) {
+    const known = (await of('class'))?.classes ?? [];
+    const nameOf = (number) => className(known.find((one) => one.class === Number(number)) ?? { class: number });
+    for (const [number, votes] of classes.sort((a, b) => b[1] - a[1])) rows.push(['class', `${nameOf(number)}: ${votes}`]);
+  }
+  if (found.last_ns !== undefined) {
+    const legend = joined([await of('time')].filter(Boolean));
+    for (const [name, ns] of [['first hit', found.first_ns], ['last hit', found.last_ns]]) rows.push([name, timeText(ns * 1e-9, legend)]);
+  }
+  return rows;
 }
 
 async function mark(layer, center) {
@@ -466,6 +572,7 @@ async function change() {
   for (const { id, generation } of maps) record(id, generation);
   const behind = viewer.layers.filter(isBehind);
   for (const layer of viewer.layers) layer.map = maps.find(({ id }) => id === layer.map.id) ?? layer.map;
+  await loadLegend(behind);
   if (viewer.layers.some((layer) => layer.id !== idOf(layer.map))) {
     // A shown snapshot was deleted.
     showMaps();
@@ -528,7 +635,12 @@ function start() {
 
 // --- Controls
 
-$('colour').addEventListener('change', paint);
+function colour() {
+  paint();
+  loadLegend();
+}
+
+$('colour').addEventListener('change', colour);
 $('threshold').addEventListener('input', paint);
 for (const id of CUTS) $(id).addEventListener('input', cut);
 $('uncut').addEventListener('click', () => {
@@ -608,10 +720,10 @@ const keys = {
 };
 window.addEventListener('keydown', (event) => {
   if (event.ctrlKey || event.metaKey || event.altKey || $('keys').open || event.target.matches?.('select')) return;
-  const digit = /^Digit([1-4])$/.exec(event.code);
-  if (digit) {
+  const digit = /^Digit([1-8])$/.exec(event.code);
+  if (digit && $('colour').options[digit[1] - 1]) {
     $('colour').selectedIndex = Number(digit[1]) - 1;
-    paint();
+    colour();
   } else keys[event.code]?.();
 });
 
@@ -659,6 +771,12 @@ window.voxtile = {
     return { ...sum, [kind]: (sum[kind] ?? 0) + userData.node.count };
   }, {}),
   faces: () => viewer.layers.flatMap((layer) => layer.meshes()).reduce((sum, [mesh]) => sum + mesh.userData.faces, 0),
+  // Choice of colours that all drawn nodes of maps with its layer have.
+  painted() {
+    const name = BY_LAYER[viewer.colour] ?? null;
+    const nodes = viewer.layers.filter((layer) => layer.layerName).flatMap((layer) => layer.meshes().map(([mesh]) => mesh.userData.node));
+    return nodes.every((node) => !name || node.values?.name === name) && legendNumber === legendShown ? viewer.colour : null;
+  },
   drawCalls: () => viewer.renderer.info.render.calls,
   mostDrawCalls: () => viewer.mostCalls,
   bytes: () => viewer.layers.reduce((sum, layer) => sum + layer.bytes, 0),

@@ -1,10 +1,12 @@
 import * as THREE from 'three';
+import { NO_VALUE } from './layers.js';
 import { CHANGES, MOVING, ramp } from './palette.js';
 import { KIND } from './node.js';
 
 const vertex = /* glsl */ `
 attribute vec4 place;
 attribute vec4 levels;
+attribute vec4 paint;
 uniform float threshold;
 uniform vec3 low, high;
 uniform int colourBy;
@@ -15,6 +17,7 @@ varying vec2 corner;
 varying float share;
 varying float light;
 varying float change;
+varying vec4 layerColour;
 void main() {
   int side = int(place.w + 0.5);
   bool isSeen = kind != 0 || (levels.x >= threshold && (levels.y < 0.5 || levels.y - 1.0 < threshold));
@@ -32,7 +35,8 @@ void main() {
   else { at = vec3(uv.y, uv.x, 0.0); light = 0.5; }
   corner = uv;
   change = levels.x;
-  float value = colourBy == 0 ? mid.z : colourBy == 1 ? levels.x : colourBy == 2 ? levels.z : lastScan;
+  layerColour = paint;
+  float value = colourBy <= 0 ? mid.z : colourBy == 1 ? levels.x : colourBy == 2 ? levels.z : lastScan;
   share = clamp((value - range.x) / max(range.y - range.x, 1e-6), 0.0, 1.0);
   gl_Position = projectionMatrix * modelViewMatrix * vec4(place.xyz + at, 1.0);
 }`;
@@ -42,13 +46,18 @@ uniform sampler2D ramp;
 uniform vec4 tint;
 uniform vec3 changes[3];
 uniform int kind;
+uniform bool isPainted;
+uniform vec3 noValue;
 varying vec2 corner;
 varying float share;
 varying float light;
 varying float change;
+varying vec4 layerColour;
+vec3 linearOf(vec3 c) { return mix(c / 12.92, pow((c + 0.055) / 1.055, vec3(2.4)), step(0.04045, c)); }
 void main() {
   vec3 colour = texture2D(ramp, vec2(share, 0.5)).rgb;
   if (kind == 3) colour = change < 1.5 ? changes[0] : change < 2.5 ? changes[1] : changes[2];
+  else if (isPainted) colour = layerColour.a > 0.5 ? linearOf(layerColour.rgb) : noValue;
   else if (tint.a > 0.0) colour = tint.rgb * (0.55 + 0.45 * share);
   // Draw borders if a voxel is large enough on the screen.
   vec2 pixel = fwidth(corner);
@@ -80,6 +89,10 @@ export function makeMaterial(kind, shared) {
       threshold: { value: 0 },
       range: { value: new THREE.Vector2(0, 1) },
       lastScan: { value: 0 },
+      // Name of the layer that is shown, and whether the drawn node has its colours.
+      layer: { value: null },
+      isPainted: { value: false },
+      noValue: { value: linear(NO_VALUE) },
     },
   });
 }

@@ -1,5 +1,7 @@
 // Decodes map nodes (docs/view.md) and computes the faces of their voxels.
 
+import { bytesOfValues, parseValues } from './layers.js';
+
 const HEAD = 64;
 // Maximum edge length, with a margin on each side for neighbours.
 const MOST = 130;
@@ -21,7 +23,8 @@ export function parseNode(buffer) {
   const view = new DataView(buffer);
   if (buffer.byteLength < HEAD || view.getUint32(0, false) !== 0x56584e31) throw new Error('not a map node');
   const count = view.getUint32(4, true);
-  if (buffer.byteLength !== HEAD + 5 * count) throw new Error('map node with a wrong length');
+  const layer = view.getUint8(47);
+  if (buffer.byteLength !== HEAD + 5 * count + bytesOfValues(count, layer)) throw new Error('map node with a wrong length');
   const plane = (k) => new Uint8Array(buffer, HEAD + k * count, count);
   return {
     count,
@@ -35,6 +38,7 @@ export function parseNode(buffer) {
     threshold: view.getFloat32(56, true),
     x: steps(plane(0)), y: steps(plane(1)), z: steps(plane(2)),
     value: plane(3).slice(), counts: plane(4).slice(),
+    values: layer ? parseValues(view, HEAD + 5 * count, count, layer) : null,
   };
 }
 
@@ -42,9 +46,9 @@ const cell = (x, y, z) => x + 1 + MOST * (y + 1 + MOST * (z + 1));
 const BESIDE = [1, -1, MOST, -MOST, MOST * MOST, -MOST * MOST];
 
 // Returns the faces that any threshold can make visible: position and direction (+x -x +y -y +z -z), the value of the
-// voxel, that of its neighbour plus one (0 without a neighbour), and the count. Only occupied voxels (kind 0) have
-// values to compare.
-export function facesOf(node) {
+// voxel, that of its neighbour plus one (0 without a neighbour), and the count; and its colour by a layer, if `paint` has
+// one for each voxel. Only occupied voxels (kind 0) have values to compare.
+export function facesOf(node, paint) {
   const { count, x, y, z, value, counts, kind } = node;
   for (let i = 0; i < count; i++) grid[cell(x[i], y[i], z[i])] = kind === KIND.occupied ? value[i] + 1 : 256;
   let n = 0;
@@ -54,6 +58,7 @@ export function facesOf(node) {
   }
   const places = new Uint8Array(4 * n);
   const levels = new Uint8Array(4 * n);
+  const paints = paint && new Uint8Array(4 * n);
   n = 0;
   for (let i = 0; i < count; i++) {
     const at = cell(x[i], y[i], z[i]);
@@ -62,11 +67,12 @@ export function facesOf(node) {
       if (beside >= grid[at]) continue;
       places.set([x[i], y[i], z[i], side], 4 * n);
       levels.set([value[i], beside, counts[i], 0], 4 * n);
+      paints?.set(paint.subarray(4 * i, 4 * i + 4), 4 * n);
       n++;
     }
   }
   for (let i = 0; i < count; i++) grid[cell(x[i], y[i], z[i])] = 0;
-  return { places, levels, count: n };
+  return { places, levels, paints, count: n };
 }
 
 // Returns the positions of a node's voxels for ray casting, computed on first use.

@@ -1,6 +1,7 @@
 import * as THREE from 'three';
 import { Flight } from './camera.js';
 import { Layer } from './layer.js';
+import { BY_LAYER } from './layers.js';
 import { LAYERS } from './palette.js';
 import { sharedUniforms } from './material.js';
 import { KIND } from './node.js';
@@ -66,10 +67,10 @@ export class Viewer {
     return point.map((k, axis) => k - this.world.position.getComponent(axis));
   }
 
-  show(maps) {
+  show(maps, legend) {
     for (const layer of this.layers) layer.dispose();
     this.layers = maps.map(({ map, id }, k) => {
-      const layer = new Layer(this, map, id, maps.length > 1 ? LAYERS[k % LAYERS.length] : null);
+      const layer = new Layer(this, map, id, maps.length > 1 ? LAYERS[k % LAYERS.length] : null, legend);
       this.world.add(layer.group);
       return layer;
     });
@@ -156,8 +157,10 @@ export class Viewer {
       const uniforms = layer.material.uniforms;
       uniforms.threshold.value = this.threshold;
       const z = [layer.map.low, layer.map.high].map((k) => k + this.world.position.z);
-      const range = { height: z, probability: [0, 255], count: [0, 128], scan: [0, Math.max(layer.map.scans ?? 1, 1)] }[this.colour];
+      // Voxels without values of the layer, or whose values are not loaded yet, are coloured by height.
+      const range = { probability: [0, 255], count: [0, 128], scan: [0, Math.max(layer.map.scans ?? 1, 1)] }[this.colour] ?? z;
       uniforms.range.value.set(...range);
+      uniforms.layer.value = BY_LAYER[this.colour] ?? null;
     }
   }
 
