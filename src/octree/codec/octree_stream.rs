@@ -93,14 +93,13 @@ impl<S: Read + Write + Seek> OctreeStream<S> {
         match &mut self.blocks {
             Blocks::Bt { encoder, threshold, blocks, .. } => {
                 let mut content = BrickContent::new();
-                let mut brick =
-                    |encoder: &mut BtEncoder, parts: Range<usize>, out: &mut Vec<u8>| {
-                        let code = bricks[parts.start];
-                        values.gather(parts, &mut content);
-                        let word = |word| content.word(word);
-                        let (nodes, _) = BrickNodes::of_values(code, content.known, Some(*threshold), word);
-                        encoder.encode_brick(&nodes, out)
-                    };
+                let mut brick = |encoder: &mut BtEncoder, parts: Range<usize>, out: &mut Vec<u8>| {
+                    let code = bricks[parts.start];
+                    values.gather(parts, &mut content);
+                    let word = |word| content.word(word);
+                    let (nodes, _) = BrickNodes::of_values(code, content.known, Some(*threshold), word);
+                    encoder.encode_brick(&nodes, out)
+                };
                 let node = encode(encoder, &bricks, 0..bricks.len(), depth, &mut self.payload, &mut brick);
                 blocks.push(Block { first, depth, node, bytes: self.payload.len() as u64 });
             }

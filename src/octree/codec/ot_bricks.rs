@@ -113,8 +113,7 @@ impl<D: NodeData> NodeEncoder for OtEncoder<D> {
     fn join(&mut self, _: u8, children: &[OtNode<D>; 8]) -> OtNode<D> {
         let OtNode { value: first, data, .. } = children[0];
         // OctoMap's own pruning of a `ColorOcTree` ignores colours and averages them; this keeps those of all voxels.
-        let is_first =
-            |child: &OtNode<D>| child.value.to_bits() == first.to_bits() && child.data == data;
+        let is_first = |child: &OtNode<D>| child.value.to_bits() == first.to_bits() && child.data == data;
         if children.iter().all(|child| child.is_leaf && is_first(child)) {
             return OtNode { value: first, data, is_leaf: true, nodes: 1 };
         }

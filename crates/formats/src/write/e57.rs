@@ -8,8 +8,8 @@ use ::e57::{E57Writer, Record, RecordDataType, RecordName, RecordValue};
 use std::path::{Path, PathBuf};
 use voxtile::Layers;
 
-/// Three 64-bit coordinates, a 32-bit intensity and whether it is invalid, a colour and whether it is invalid.
-const RECORD_BYTES: u64 = 33;
+/// Three 64-bit coordinates, a 32-bit intensity, and a colour.
+const RECORD_BYTES: u64 = 31;
 /// Number of points to read back at once.
 const BATCH: u64 = 4096;
 
@@ -35,16 +35,15 @@ impl E57Sink {
 impl VoxelSink for E57Sink {
     fn put(&mut self, voxel: &VoxelRow) -> Result<()> {
         let RowLayers { colour, intensity, .. } = voxel.layers;
+        // E57's marks of invalid values are not written: pye57 refuses files that have them.
         let intensity = match self.layers.intensity_max {
             // A mean can exceed the largest value by rounding.
-            Some(max) => intensity.map(|mean| (mean as f32).min(max)),
-            None => Some(voxel.probability.clamp(0.0, 1.0) as f32),
+            Some(max) => intensity.map_or(0.0, |mean| (mean as f32).min(max)),
+            None => voxel.probability.clamp(0.0, 1.0) as f32,
         };
         self.points.write(voxel.center_m.map(f64::to_le_bytes).as_flattened())?;
-        self.points.write(&intensity.unwrap_or_default().to_le_bytes())?;
-        self.points.write(&[intensity.is_none().into()])?;
-        self.points.write(&colour.unwrap_or_default())?;
-        self.points.write(&[colour.is_none().into()])
+        self.points.write(&intensity.to_le_bytes())?;
+        self.points.write(&colour.unwrap_or_default())
     }
 
     fn finish(self: Box<Self>) -> Result<()> {
@@ -65,14 +64,8 @@ impl VoxelSink for E57Sink {
             for record in batch.chunks(RECORD_BYTES as usize) {
                 let [x, y, z] = [0, 8, 16].map(|k| RecordValue::Double(f64::from_le_bytes(part(record, k))));
                 let mut values = vec![x, y, z, RecordValue::Single(f32::from_le_bytes(part(record, 24)))];
-                let bytes = |at: std::ops::Range<usize>| {
-                    record[at].iter().map(|&byte| RecordValue::Integer(byte.into()))
-                };
-                if layers.intensity_max.is_some() {
-                    values.extend(bytes(28..29));
-                }
                 if layers.colour {
-                    values.extend(bytes(29..33));
+                    values.extend(part::<3>(record, 28).map(|channel| RecordValue::Integer(channel.into())));
                 }
                 cloud.add_point(values).map_err(refused)?;
             }
@@ -87,19 +80,14 @@ impl VoxelSink for E57Sink {
 /// Returns the fields of a point.
 fn records_of(layers: &Layers) -> Vec<Record> {
     let record = |name, data_type| Record { name, data_type };
-    let integer = |max| RecordDataType::Integer { min: 0, max };
     let mut records = vec![Record::CARTESIAN_X_F64, Record::CARTESIAN_Y_F64, Record::CARTESIAN_Z_F64];
-    match layers.intensity_max {
-        Some(max) => records.extend([
-            record(RecordName::Intensity, RecordDataType::Single { min: Some(0.0), max: Some(max) }),
-            record(RecordName::IsIntensityInvalid, integer(1)),
-        ]),
-        None => records.push(Record::INTENSITY_UNIT_F32),
-    }
+    records.push(match layers.intensity_max {
+        Some(max) => record(RecordName::Intensity, RecordDataType::Single { min: Some(0.0), max: Some(max) }),
+        None => Record::INTENSITY_UNIT_F32,
+    });
     if layers.colour {
         let channels = [RecordName::ColorRed, RecordName::ColorGreen, RecordName::ColorBlue];
-        records.extend(channels.map(|name| record(name, integer(255))));
-        records.push(record(RecordName::IsColorInvalid, integer(1)));
+        records.extend(channels.map(|name| record(name, RecordDataType::Integer { min: 0, max: 255 })));
     }
     records
 }
@@ -166,6 +154,35 @@ mod tests {
             let [x, y, z] = row.center_m;
             assert_eq!(point.cartesian, CartesianCoordinate::Valid { x, y, z });
             assert_eq!(point.intensity, Some(0.75));
+        }
+    }
+
+    #[test]
+    fn colours_and_intensities_round_trip() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.e57");
+        let layers = Layers { colour: true, intensity_max: Some(100.0), ..Layers::NONE };
+        let mut rows: Vec<_> = (0..300).map(|k| row([k, 0, 0], 0.75)).collect();
+        for (k, row) in rows.iter_mut().enumerate().filter(|(k, _)| k % 7 > 0) {
+            // The last one is above the largest by rounding.
+            let intensity = if k == 299 { 100.000_01 } else { k as f64 / 3.0 };
+            (row.layers.colour, row.layers.intensity) = (Some([k as u8, 2, 255]), Some(intensity));
+        }
+        let head = VoxelsHead { layers, ..head_of(&rows) };
+        let mut sink = Box::new(E57Sink::create(&head, &path, &WriteOptions::for_path(&path)).unwrap());
+        rows.iter().for_each(|row| sink.put(row).unwrap());
+        sink.finish().unwrap();
+        let mut reader = E57Reader::from_file(&path).unwrap();
+        let cloud = reader.pointclouds().remove(0);
+        let mut simple = reader.pointcloud_simple(&cloud).unwrap();
+        simple.normalize_intensity(false);
+        let points: Vec<_> = simple.collect::<::e57::Result<_>>().unwrap();
+        for (point, row) in points.iter().zip(&rows) {
+            let RowLayers { colour, intensity, .. } = row.layers;
+            let found = point.color.as_ref().unwrap();
+            let found = [found.red, found.green, found.blue].map(|channel| (255.0 * channel).round() as u8);
+            assert_eq!(found, colour.unwrap_or_default());
+            assert_eq!(point.intensity, Some(intensity.unwrap_or(0.0).min(100.0) as f32));
         }
     }
 }

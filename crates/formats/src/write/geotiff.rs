@@ -171,7 +171,8 @@ impl VoxelSink for GeoTiffSink {
                     next = parts.next()?;
                 }
                 let heights = raster.heights_of(&column, self.head.resolution_m);
-                let layers = self.layer_bands.iter().map(|band| (band.value)(&column.top).unwrap_or(f32::NAN));
+                let layers =
+                    self.layer_bands.iter().map(|band| (band.value)(&column.top).unwrap_or(f32::NAN));
                 for (band, value) in bands.iter_mut().zip(heights.into_iter().chain(layers)) {
                     let at = 4 * usize::from(place);
                     band[at..at + 4].copy_from_slice(&value.to_le_bytes());
@@ -237,12 +238,12 @@ impl GeoTiffSink {
         }
         let unit = self.options.unit.name();
         let heights = HEIGHTS.iter().map(|name| format!("{name}, {unit}"));
-        let layers = self.layer_bands.iter().map(|band| format!("{} of the highest occupied voxel", band.name));
+        let layers =
+            self.layer_bands.iter().map(|band| format!("{} of the highest occupied voxel", band.name));
         let mut items = String::new();
         for (band, name) in heights.chain(layers).enumerate() {
-            items += &format!(
-                "<Item name=\"DESCRIPTION\" sample=\"{band}\" role=\"description\">{name}</Item>"
-            );
+            items +=
+                &format!("<Item name=\"DESCRIPTION\" sample=\"{band}\" role=\"description\">{name}</Item>");
         }
         fields.push((42112, Values::Text(format!("<GDALMetadata>{items}</GDALMetadata>"))));
         fields.push((42113, Values::Text("nan".to_owned())));
@@ -313,11 +314,22 @@ mod tests {
     use super::*;
     use flate2::read::ZlibDecoder;
     use std::io::Read;
+    use voxtile::Layers;
 
     /// Writes voxels. Returns the file and the fields of its directory.
     fn written(rows: &[VoxelRow], options: &WriteOptions) -> (Vec<u8>, BTreeMap<u64, Vec<u64>>) {
+        written_with(Layers::NONE, rows, options)
+    }
+
+    /// The same, with layers.
+    fn written_with(
+        layers: Layers,
+        rows: &[VoxelRow],
+        options: &WriteOptions,
+    ) -> (Vec<u8>, BTreeMap<u64, Vec<u64>>) {
         let path = &options.final_path;
-        let mut sink = Box::new(GeoTiffSink::create(&head_of(rows), path, options).unwrap());
+        let head = VoxelsHead { layers, ..head_of(rows) };
+        let mut sink = Box::new(GeoTiffSink::create(&head, path, options).unwrap());
         rows.iter().for_each(|row| sink.put(row).unwrap());
         sink.finish().unwrap();
         let bytes = std::fs::read(path).unwrap();
@@ -325,12 +337,13 @@ mod tests {
         (bytes, fields)
     }
 
-    /// Returns the heights of a cell in each band.
-    fn cell(file: &(Vec<u8>, BTreeMap<u64, Vec<u64>>), column: usize, row: usize) -> [f32; 3] {
+    /// Returns the values of a cell in each band.
+    fn cell(file: &(Vec<u8>, BTreeMap<u64, Vec<u64>>), column: usize, row: usize) -> Vec<f32> {
         let (bytes, fields) = file;
         let across = (fields[&256][0] as usize).div_ceil(TILE_EDGE);
-        let tiles = fields[&324].len() / 3;
-        [0, 1, 2].map(|band| {
+        let bands = fields[&277][0] as usize;
+        let tiles = fields[&324].len() / bands;
+        let value = |band: usize| {
             let tile = band * tiles + row / TILE_EDGE * across + column / TILE_EDGE;
             let (at, length) = (fields[&324][tile] as usize, fields[&325][tile] as usize);
             let mut values = Vec::new();
@@ -338,7 +351,30 @@ mod tests {
             assert_eq!(values.len(), 4 * TILE_EDGE * TILE_EDGE);
             let at = 4 * (row % TILE_EDGE * TILE_EDGE + column % TILE_EDGE);
             f32::from_le_bytes(values[at..at + 4].try_into().unwrap())
-        })
+        };
+        (0..bands).map(value).collect()
+    }
+
+    #[test]
+    fn layers_are_those_of_the_highest_voxel() {
+        let folder = tempfile::tempdir().unwrap();
+        let options = WriteOptions::for_path(&folder.path().join("dem.tif"));
+        let mut rows = [row([0; 3], 0.9), row([0, 0, 2], 0.9), row([0, 0, 5], 0.1), row([1, 0, 0], 0.9)];
+        for (k, row) in rows[..3].iter_mut().enumerate() {
+            let class = (k == 1).then_some(6);
+            row.layers = RowLayers { colour: Some([k as u8, 20, 30]), class, ..RowLayers::NONE };
+            row.layers.intensity = Some(0.5 + k as f64);
+        }
+        let layers = Layers { colour: true, intensity_max: Some(9.0), class: true, ..Layers::NONE };
+        let file = written_with(layers, &rows, &options);
+        assert_eq!([file.1[&258].len(), file.1[&338].len(), file.1[&339].len()], [8, 7, 8]);
+        assert_eq!(cell(&file, 0, 0)[3..], [1.0, 20.0, 30.0, 1.5, 6.0]);
+        assert!(cell(&file, 1, 0)[3..].iter().all(|value| value.is_nan()));
+        let text: String = file.1[&42112].iter().map(|&byte| byte as u8 as char).collect();
+        assert!(text.contains("sample=\"7\" role=\"description\">class of the highest"), "{text}");
+        // Only the bands of existing layers.
+        let class_alone = Layers { class: true, ..Layers::NONE };
+        assert_eq!(cell(&written_with(class_alone, &rows, &options), 0, 0)[3..], [6.0]);
     }
 
     #[test]

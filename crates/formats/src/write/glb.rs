@@ -415,4 +415,45 @@ mod tests {
             assert_eq!(found.into_iter().collect::<HashSet<_>>(), expected);
         }
     }
+
+    #[test]
+    fn faces_have_the_colours_of_their_voxels() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.glb");
+        // Two voxels in different bricks, which hide one face of each other, and one without a colour.
+        let mut rows = [row([31, 0, 0], 0.9), row([32, 0, 0], 0.9), row([0, 0, 9], 0.9)];
+        rows[0].layers.colour = Some([0, 188, 255]);
+        rows[1].layers.colour = Some([1, 2, 3]);
+        let layers = voxtile::Layers { colour: true, ..voxtile::Layers::NONE };
+        for (is_quantized, stride) in [(false, 20), (true, 16)] {
+            let head = VoxelsHead { layers, ..head_of(&rows) };
+            let options = WriteOptions { is_quantized, ..WriteOptions::for_path(&path) };
+            let mut sink = Box::new(GlbSink::create(&head, &path, &options).unwrap());
+            rows.iter().for_each(|row| sink.put(row).unwrap());
+            sink.finish().unwrap();
+            let bytes = std::fs::read(&path).unwrap();
+            let json_bytes = u32::from_le_bytes(bytes[12..16].try_into().unwrap()) as usize;
+            let json: serde_json::Value = serde_json::from_slice(&bytes[20..20 + json_bytes]).unwrap();
+            let accessor = &json["accessors"][1];
+            let of_colour = (&accessor["byteOffset"], &accessor["componentType"]);
+            assert_eq!(of_colour, (&(stride - 8).into(), &5123.into()));
+            assert_eq!(json["bufferViews"][0]["byteStride"], stride);
+            let count = accessor["count"].as_u64().unwrap() as usize;
+            assert_eq!(count, 4 * (5 + 5 + 6));
+            let start = 20 + json_bytes + 8 + stride - 8;
+            let mut counts = std::collections::BTreeMap::new();
+            for vertex in 0..count {
+                let at = start + vertex * stride;
+                let channel =
+                    |k: usize| u16::from_le_bytes(bytes[at + 2 * k..at + 2 * k + 2].try_into().unwrap());
+                *counts.entry([0, 1, 2, 3].map(channel)).or_insert(0) += 1;
+            }
+            let linear = |colour: [u8; 3]| {
+                let [red, green, blue] = colour.map(linear_of_srgb);
+                [red, green, blue, u16::MAX]
+            };
+            let expected = [(linear([0, 188, 255]), 20), (linear([1, 2, 3]), 20), (linear(GRAY), 24)];
+            assert_eq!(counts, expected.into_iter().collect());
+        }
+    }
 }

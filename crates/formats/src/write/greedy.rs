@@ -87,10 +87,7 @@ fn at([x, y, z]: [usize; 3]) -> usize {
 
 /// Covers the cells that are not empty with rectangles of equal cells, row by row: first extended in width, then in
 /// height.
-fn rectangles(
-    mask: &mut [[u32; BRICK]; BRICK],
-    emit: &mut dyn FnMut([usize; 2], [usize; 2], u32),
-) {
+fn rectangles(mask: &mut [[u32; BRICK]; BRICK], emit: &mut dyn FnMut([usize; 2], [usize; 2], u32)) {
     for row in 0..BRICK {
         let mut column = 0;
         while column < BRICK {
@@ -152,9 +149,8 @@ mod tests {
         }
         let mut quads = Vec::new();
         brick.quads(&mut |quad| quads.push(quad));
-        let area_of = |colour: [u8; 3]| {
-            quads.iter().filter(|quad| quad.colour == colour).map(area).sum::<usize>()
-        };
+        let area_of =
+            |colour: [u8; 3]| quads.iter().filter(|quad| quad.colour == colour).map(area).sum::<usize>();
         assert_eq!((area_of([1, 2, 3]), area_of([0; 3])), (4, 14));
         // Both ends, and three rectangles along each of four sides.
         assert_eq!(quads.len(), 2 + 3 * 4);

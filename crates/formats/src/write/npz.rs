@@ -38,11 +38,17 @@ impl NpzSink {
     fn in_zip(zip: ZipStore, head: &VoxelsHead, options: &WriteOptions) -> Result<Self> {
         let layers = head.layers;
         let columns: [(bool, &str, &str, &str, AppendValue); 8] = [
-            (true, "xyz.npy", "<f8", ", 3", |row, to| to.extend(row.center_m.map(f64::to_le_bytes).as_flattened())),
+            (true, "xyz.npy", "<f8", ", 3", |row, to| {
+                to.extend(row.center_m.map(f64::to_le_bytes).as_flattened())
+            }),
             (true, "log_odds.npy", "<f8", ",", |row, to| to.extend(row.log_odds.to_le_bytes())),
-            (true, "probability.npy", "<f4", ",", |row, to| to.extend((row.probability as f32).to_le_bytes())),
+            (true, "probability.npy", "<f4", ",", |row, to| {
+                to.extend((row.probability as f32).to_le_bytes())
+            }),
             (true, "count.npy", "<i4", ",", |row, to| to.extend(row.observation_count.to_le_bytes())),
-            (layers.colour, "colour.npy", "|u1", ", 3", |row, to| to.extend(row.layers.colour.unwrap_or_default())),
+            (layers.colour, "colour.npy", "|u1", ", 3", |row, to| {
+                to.extend(row.layers.colour.unwrap_or_default())
+            }),
             (layers.intensity_max.is_some(), "intensity.npy", "<f8", ",", |row, to| {
                 to.extend(row.layers.intensity.unwrap_or(f64::NAN).to_le_bytes());
             }),
@@ -109,7 +115,10 @@ pub(super) fn npy_head(of: &str, shape: &str) -> Vec<u8> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::RowLayers;
+    use super::super::testing::{head_of, row};
     use super::*;
+    use voxtile::Layers;
 
     fn archive(zip64_from: u64) -> Vec<u8> {
         let folder = tempfile::tempdir().unwrap();
@@ -119,7 +128,7 @@ mod tests {
             resolution_m: 0.5,
             bounds_m: [[0.0; 3], [1.0; 3]],
             occupied_log_odds: 0.0,
-            layers: voxtile::Layers::NONE,
+            layers: Layers::NONE,
         };
         let zip = ZipStore::create(&path).unwrap().with_zip64_from(zip64_from);
         let mut sink = Box::new(NpzSink::in_zip(zip, &head, &WriteOptions::for_path(&path)).unwrap());
@@ -131,12 +140,42 @@ mod tests {
                 log_odds: 0.85,
                 observation_count: 3,
                 tile: [0; 3],
-                layers: super::super::RowLayers::default(),
+                layers: RowLayers::default(),
             };
             sink.put(&voxel).unwrap();
         }
         sink.finish().unwrap();
         std::fs::read(path).unwrap()
+    }
+
+    #[test]
+    fn layers_are_arrays() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.npz");
+        let layers = Layers { colour: true, intensity_max: Some(1.0), class: true, time: true, shape: true };
+        let mut rows = [row([0; 3], 0.9), row([1, 0, 0], 0.9)];
+        rows[0].layers = RowLayers {
+            colour: Some([1, 2, 3]),
+            intensity: Some(0.25),
+            stored_intensity: None,
+            class: Some(9),
+            time_ns: Some([-5, 7]),
+        };
+        let head = VoxelsHead { layers, ..head_of(&rows) };
+        let mut sink = Box::new(NpzSink::create(&head, &path, &WriteOptions::for_path(&path)).unwrap());
+        rows.iter().for_each(|row| sink.put(row).unwrap());
+        sink.finish().unwrap();
+        let bytes = std::fs::read(&path).unwrap();
+        let array = |name: &str, length: usize| {
+            let at = bytes.windows(name.len()).position(|part| part == name.as_bytes()).unwrap() + name.len();
+            let head = usize::from(bytes[at + 8]) + 256 * usize::from(bytes[at + 9]) + 10;
+            bytes[at + head..at + head + length].to_vec()
+        };
+        assert_eq!(array("colour.npy", 6), [1, 2, 3, 0, 0, 0]);
+        assert_eq!(array("intensity.npy", 16), [0.25_f64, f64::NAN].map(f64::to_le_bytes).as_flattened());
+        assert_eq!(array("class.npy", 2), [9, 0]);
+        let times = [-5, 7, i64::MIN, i64::MIN].map(i64::to_le_bytes);
+        assert_eq!(array("time_ns.npy", 32), times.as_flattened());
     }
 
     #[test]

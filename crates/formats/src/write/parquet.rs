@@ -65,7 +65,8 @@ impl ParquetSink {
 
     fn write_group(&mut self) -> Result<()> {
         if !self.rows.is_empty() {
-            write_group(&mut self.writer, &self.layers, &self.rows).map_err(|error| refused(&self.path, error))?;
+            write_group(&mut self.writer, &self.layers, &self.rows)
+                .map_err(|error| refused(&self.path, error))?;
             self.rows.clear();
         }
         Ok(())

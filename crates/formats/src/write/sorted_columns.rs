@@ -39,7 +39,13 @@ impl Column {
     /// Creates the column of the voxel with index `z`.
     fn of(z: i32, layers: &RowLayers) -> Self {
         // Others are not stored.
-        Self { highest: z, lowest: z, count: 1, sum: i64::from(z), top: RowLayers { time_ns: None, stored_intensity: None, ..*layers } }
+        Self {
+            highest: z,
+            lowest: z,
+            count: 1,
+            sum: i64::from(z),
+            top: RowLayers { time_ns: None, stored_intensity: None, ..*layers },
+        }
     }
 
     /// Adds the voxels of another part of the same column.

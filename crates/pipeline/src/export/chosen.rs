@@ -45,8 +45,6 @@ impl Chosen {
         let (min_probability, min_log_odds, end_log_odds) = match export.options.which.unwrap_or(default) {
             WhichVoxels::Occupied => (None, threshold, f64::INFINITY),
             WhichVoxels::Free => (Some(0.0), f64::NEG_INFINITY, threshold),
-            // No log-odds have the probability 1.
-            WhichVoxels::AtLeast(1.0) => (Some(1.0), f64::INFINITY, f64::INFINITY),
             WhichVoxels::AtLeast(probability) if probability > 0.0 => {
                 (Some(probability), least_logit(probability), f64::INFINITY)
             }
@@ -101,7 +99,8 @@ impl Chosen {
         let mut tiles = Tiles { all: map.tile_indices(), done: 0, gauge };
         let mut probabilities = Probabilities::default();
         let mut row_of = |Voxel { index, evidence, .. }, tile: TileIndex, made: Option<VoxelLayers>| {
-            let offset = made.as_ref().filter(|_| self.mean_points).and_then(|made| made.mean_offset(&of_map));
+            let offset =
+                made.as_ref().filter(|_| self.mean_points).and_then(|made| made.mean_offset(&of_map));
             VoxelRow {
                 index,
                 center_m: point_m(index, offset.unwrap_or_default()),

@@ -20,6 +20,7 @@ pub(super) fn export(export: &Export<'_>) -> anyhow::Result<ExportSummary> {
         let mut how = WriteOptions::for_path(&options.output);
         how.crs = options.file_crs(map.config().crs.as_ref())?;
         how.unit = unit;
+        how.has_mean_points = chosen.mean_points;
         how.companion_folder = staged.folder().to_owned();
         let in_file = |length_m: f64| unit.of_metres(length_m);
         (how.z_min_m, how.z_max_m) = (options.z_min_m.map(in_file), options.z_max_m.map(in_file));
