@@ -149,6 +149,8 @@ pub fn export_options(
         return Err(wrong(py, "min_probability", "cannot be combined with `what`; leave one of the two out"));
     }
     options.which = min_probability.or(what);
+    options.with_layers = !keywords.flag("no_layers")?;
+    options.mean_points = keywords.flag("mean_points")?;
     options.z_min_m = keywords.number("z_min")?;
     options.z_max_m = keywords.number("z_max")?;
     options.cell_m = keywords.number("cell")?;

@@ -2,6 +2,7 @@
 
 use crate::config::{clearing_of, memory_of, storage_of};
 use crate::errors::{exception_of_kind, wrong};
+use crate::layers::layers_of;
 use crate::map::region_of;
 use crate::operations::{Callback, MapOrSnapshot, folder_of, name_of, reported};
 use crate::pose::pose_of;
@@ -63,7 +64,7 @@ pub fn remap<'py>(
 /// the map.
 #[pyfunction]
 #[pyo3(signature = (map, output, *, resolution=None, tile_size=None, min_range=None, max_range=None, insert_mode=None,
-    clearing=None, storage=None, keep_scans=false, memory=None, progress=None))]
+    clearing=None, layers=None, storage=None, keep_scans=false, memory=None, progress=None))]
 #[expect(clippy::too_many_arguments, reason = "keywords, in Python")]
 pub fn remap_as<'py>(
     py: Python<'py>,
@@ -75,6 +76,7 @@ pub fn remap_as<'py>(
     max_range: Option<f64>,
     insert_mode: Option<&str>,
     clearing: Option<&str>,
+    layers: Option<Bound<'py, PyAny>>,
     storage: Option<&str>,
     keep_scans: bool,
     memory: Option<Bound<'py, PyAny>>,
@@ -89,6 +91,7 @@ pub fn remap_as<'py>(
         }
     };
     let clearing = clearing.map(|clearing| clearing_of(py, clearing)).transpose()?;
+    let layers = layers.as_ref().map(layers_of).transpose()?;
     let storage = storage.map(|storage| storage_of(py, storage)).transpose()?;
     let memory = memory_of(memory.as_ref())?;
     reported(py, progress, |stop, progress| {
@@ -98,6 +101,7 @@ pub fn remap_as<'py>(
         config.grid = config.grid.replaced(resolution, tile_size)?;
         config.storage = storage.unwrap_or(config.storage);
         config.memory = memory;
+        config.layers = layers.or(config.layers);
         let rays = |rays: &voxtile::RayConfig| {
             let mut rays = *rays;
             rays.min_range_m = min_range.unwrap_or(rays.min_range_m);

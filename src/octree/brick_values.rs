@@ -1,14 +1,17 @@
+use super::node_colour::NodeColour;
 use crate::space::{BRICK_VOXELS, BrickCode, BrickMask, add_to_mask};
 use std::ops::Range;
 
 /// Values of many voxels, in parts of bricks: the input of an encoded block of an octree.
 ///
-/// Takes four bytes per voxel and 80 per part. A brick may have several parts: one on the border of two tiles has
-/// voxels of both.
+/// Takes four bytes per voxel, seven with colours, and 80 per part. A brick may have several parts: one on the border
+/// of two tiles has voxels of both.
 #[derive(Debug, Default)]
 pub struct BrickValues {
     parts: Vec<Part>,
     values: Vec<f32>,
+    /// One per value; `None` in a tree without colours.
+    colours: Option<Vec<NodeColour>>,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -25,12 +28,29 @@ pub(super) struct BrickContent {
     pub(super) known: BrickMask,
     /// Negative infinity for unknown voxels.
     pub(super) values: [f32; BRICK_VOXELS],
+    /// Empty in a tree without colours.
+    pub(super) colours: Vec<NodeColour>,
 }
 
 impl BrickValues {
+    /// Creates values of voxels that have colours.
+    pub fn with_colours() -> Self {
+        Self { colours: Some(Vec::new()), ..Self::default() }
+    }
+
+    /// Returns whether the voxels have colours.
+    pub fn has_colours(&self) -> bool {
+        self.colours.is_some()
+    }
+
     /// Bytes in use.
     pub fn bytes(&self) -> usize {
-        self.parts.len() * size_of::<Part>() + self.values.len() * size_of::<f32>()
+        self.parts.len() * size_of::<Part>() + self.values.len() * self.voxel_bytes()
+    }
+
+    /// Bytes per voxel, without those of its part.
+    pub fn voxel_bytes(&self) -> usize {
+        size_of::<f32>() + if self.has_colours() { size_of::<NodeColour>() } else { 0 }
     }
 
     /// Number of voxels.
@@ -47,6 +67,9 @@ impl BrickValues {
     pub fn clear(&mut self) {
         self.parts.clear();
         self.values.clear();
+        if let Some(colours) = &mut self.colours {
+            colours.clear();
+        }
     }
 
     /// Begins the next part; [`BrickValues::add`] adds its voxels, and [`BrickValues::end`] ends it.
@@ -54,12 +77,21 @@ impl BrickValues {
         self.parts.push(Part { brick, known: [0; 8], first: self.values.len() as u64 });
     }
 
-    /// Adds a voxel to the current part. Positions (0 to 511) must ascend.
+    /// Adds a voxel without a colour to the current part. Positions (0 to 511) must ascend.
     #[inline]
     pub fn add(&mut self, place: usize, value: f32) {
+        self.add_coloured(place, value, NodeColour::NONE);
+    }
+
+    /// Adds a voxel to the current part. The colour counts only if the voxels have colours.
+    #[inline]
+    pub fn add_coloured(&mut self, place: usize, value: f32, colour: NodeColour) {
         if let Some(part) = self.parts.last_mut() {
             add_to_mask(&mut part.known, place);
             self.values.push(value);
+            if let Some(colours) = &mut self.colours {
+                colours.push(colour);
+            }
         }
     }
 
@@ -89,15 +121,19 @@ impl BrickValues {
 
     /// Writes the voxels of the parts of one brick to `content`.
     pub(super) fn gather(&self, parts: Range<usize>, content: &mut BrickContent) {
-        content.clear();
+        content.clear(self.has_colours());
         for part in &self.parts[parts] {
             let mut values = self.values[part.first as usize..].iter();
+            let mut colours = self.colours.iter().flat_map(|colours| &colours[part.first as usize..]);
             for (word, &known) in part.known.iter().enumerate() {
                 content.known[word] |= known;
                 let mut bits = known;
                 while bits != 0 {
                     let place = 64 * word + bits.trailing_zeros() as usize;
                     content.values[place] = values.next().copied().unwrap_or(f32::NEG_INFINITY);
+                    if let Some(colour) = colours.next() {
+                        content.colours[place] = *colour;
+                    }
                     bits &= bits - 1;
                 }
             }
@@ -107,12 +143,16 @@ impl BrickValues {
 
 impl BrickContent {
     pub(super) fn new() -> Self {
-        Self { known: [0; 8], values: [f32::NEG_INFINITY; BRICK_VOXELS] }
+        Self { known: [0; 8], values: [f32::NEG_INFINITY; BRICK_VOXELS], colours: Vec::new() }
     }
 
-    fn clear(&mut self) {
+    fn clear(&mut self, has_colours: bool) {
         self.known = [0; 8];
         self.values.fill(f32::NEG_INFINITY);
+        self.colours.clear();
+        if has_colours {
+            self.colours.resize(BRICK_VOXELS, NodeColour::NONE);
+        }
     }
 
     pub(super) fn word(&self, word: usize) -> [f32; 64] {

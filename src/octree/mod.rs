@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! Octree       16 levels below the root, f32 log-odds, pruned immediately  tree, block, leaves, overrides
-//! read, write  `.bt` (occupied / free) and `.ot` (all values) files         codec, brick_nodes, brick_values
+//! read, write  `.bt` (occupied / free) and `.ot` (all values) files         codec, brick_nodes, brick_values, node_colour
 //! ```
 //!
 //! A tree is independent of metres and tiles: a voxel is its [`MortonCode`](crate::space::MortonCode). A file adds the
@@ -13,6 +13,7 @@ mod brick_nodes;
 mod brick_values;
 mod codec;
 mod leaves;
+mod node_colour;
 mod overrides;
 mod tree;
 
@@ -24,6 +25,7 @@ pub use codec::{
     write_ot,
 };
 pub use leaves::{Leaf, Leaves};
+pub use node_colour::NodeColour;
 pub use tree::{Octree, VoxelCounts};
 
 #[cfg(test)]

@@ -53,7 +53,7 @@ pub use merge_rule::Prefer;
 pub use part::{AreaPart, Part};
 pub use remapping::{
     NewPoses, OnlineRemap, PointsRemoved, Rebuilt, Remap, Remapped, Replay, Replayed, ScanSelection,
-    ScansRemoved, SnapshotFailure, mark_moving, rebuild, remap, remove_points, remove_scans,
+    ScansRemoved, ScansWithout, SnapshotFailure, mark_moving, rebuild, remap, remove_points, remove_scans,
 };
 pub use replace_tiles::{TilesReplaced, replace_tiles};
 pub use revert::{Reverted, revert};

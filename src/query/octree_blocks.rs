@@ -3,14 +3,15 @@ use super::octree_shift::OctreeShift;
 use super::region::voxels_around;
 use crate::error::{Error, Result};
 use crate::mapper::{MapView, TileRef};
-use crate::octree::{BrickValues, BtPruning, OctreeFormat, OctreeStream, StreamOutcome};
+use crate::octree::{BrickValues, BtPruning, NodeColour, OctreeFormat, OctreeStream, StreamOutcome};
 use crate::space::{Aabb, BRICK_EDGE, MortonCode, TileIndex, VoxelBox, VoxelIndex};
 use std::io::{self, Read, Seek, Write};
 
 /// Parameters of [`MapQueries::write_octree`](super::MapQueries::write_octree).
 #[derive(Clone, Copy, Debug)]
 pub struct OctreeExport<'a> {
-    /// `.bt` or `.ot`. In `.bt` a voxel is occupied from the map's occupancy threshold on.
+    /// `.bt` or `.ot`. In `.bt` a voxel is occupied from the map's occupancy threshold on. In `.ot` of a `ColorOcTree` a
+    /// voxel has the mean colour of its points; it is white if the map does not have the layer.
     pub format: OctreeFormat,
     /// Restricts the export to voxels whose center is in this half-open box; `None` exports the whole map.
     pub region: Option<&'a Aabb>,
@@ -38,17 +39,23 @@ pub(super) fn write_octree<E: From<Error> + From<io::Error>>(
         let mut stream = match export.format {
             OctreeFormat::Bt => OctreeStream::bt(config.occupied_log_odds() as f32, pruning, &mut *spool),
             OctreeFormat::Ot => OctreeStream::ot(&mut *spool),
+            OctreeFormat::ColorOt => OctreeStream::color_ot(&mut *spool),
         };
-        // The rest of the memory is for the encoded values: up to six bytes per voxel in `.ot`.
+        // The rest of the memory is for the encoded values: up to six bytes per voxel in `.ot`, ten with a colour.
         let block_bytes = match export.format {
             OctreeFormat::Bt => export.memory_bytes / 3 * 2,
-            OctreeFormat::Ot => export.memory_bytes / 3,
+            OctreeFormat::Ot | OctreeFormat::ColorOt => export.memory_bytes / 3,
+        };
+        let values = match export.format {
+            OctreeFormat::ColorOt => BrickValues::with_colours(),
+            OctreeFormat::Bt | OctreeFormat::Ot => BrickValues::default(),
         };
         for_each_block(
             view,
             export.region,
             export.origin,
             block_bytes,
+            values,
             |first, depth, values| -> std::result::Result<(), E> {
                 Ok(stream.add_block(first, depth, values)?)
             },
@@ -61,17 +68,18 @@ pub(super) fn write_octree<E: From<Error> + From<io::Error>>(
 }
 
 /// Visits the map's voxels as blocks of OctoMap's tree, in Morton order, with the first voxel, depth and values of
-/// each. A block has at most `block_bytes` of values, unless it is a single brick.
+/// each. A block has at most `block_bytes` of values, unless it is a single brick. `values` is empty.
 fn for_each_block<E: From<Error>>(
     view: &impl MapView,
     region: Option<&Aabb>,
     origin: VoxelIndex,
     block_bytes: usize,
+    values: BrickValues,
     visit: impl FnMut(MortonCode, u8, &mut BrickValues) -> std::result::Result<(), E>,
 ) -> std::result::Result<(), E> {
     let shift = OctreeShift::by(origin);
     let tiles = tiles_of(view, region, &shift)?;
-    let mut blocks = Blocks { view, region, shift, block_bytes, values: BrickValues::default(), visit };
+    let mut blocks = Blocks { view, region, shift, block_bytes, values, visit };
     blocks.descend(MortonCode(0), 0, &tiles)
 }
 
@@ -162,8 +170,9 @@ impl<V: MapView, F> Blocks<'_, V, F> {
             let share = volume(&tile.intersection(&node)) / volume(&tile);
             self.view.voxels_of_tile_hint(index).map_or(0.0, |voxels| voxels as f64 * share)
         });
-        // Values have four bytes; parts of bricks take slightly more.
-        depth == BRICK_DEPTH || 4.0 * expected.sum::<f64>() <= self.block_bytes as f64
+        // Parts of bricks take slightly more.
+        let bytes = self.values.voxel_bytes() as f64 * expected.sum::<f64>();
+        depth == BRICK_DEPTH || bytes <= self.block_bytes as f64
     }
 
     /// Collects the voxels of a node; returns `false`, with some of them collected, if they are too many.
@@ -171,15 +180,21 @@ impl<V: MapView, F> Blocks<'_, V, F> {
         self.values.clear();
         let node = first.brick()..MortonCode(first.0 + MortonCode::span(depth)).brick();
         let grid = &self.view.config().grid;
+        let has_colours = self.values.has_colours();
         for &index in tiles {
             let Some(tile) = self.view.tile_uncached(index)? else { continue };
             let table = tile.table();
+            let colour_of = |voxel| {
+                let made = if has_colours { table.layers_of(voxel) } else { None };
+                made.and_then(|made| made.mean_colour()).map_or(NodeColour::NONE, NodeColour)
+            };
             for brick in table.bricks() {
                 self.shift.add_brick(brick, &node, &mut self.values, |add| {
                     table.for_each_in(brick, |place, evidence| {
-                        let center_m = || grid.center_m(tile.index_of(brick.voxel(place)));
+                        let voxel = brick.voxel(place);
+                        let center_m = || grid.center_m(tile.index_of(voxel));
                         if self.region.is_none_or(|region| region.contains(center_m())) {
-                            add(place, evidence.log_odds as f32);
+                            add(place, evidence.log_odds as f32, colour_of(voxel));
                         }
                     });
                 });

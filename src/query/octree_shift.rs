@@ -1,4 +1,4 @@
-use crate::octree::BrickValues;
+use crate::octree::{BrickValues, NodeColour};
 use crate::space::{BRICK_EDGE, BrickCode, MortonCode, VoxelBox, VoxelIndex, VoxelKey, place_of_voxel};
 use std::ops::Range;
 
@@ -12,7 +12,7 @@ pub(super) struct OctreeShift {
     /// Offset within bricks: the position, in a brick of the octree, of the first voxel of a brick of the map.
     first: VoxelIndex,
     /// Parts of one brick of the map in each of the eight overlapping bricks of the octree, by position.
-    shares: [Vec<(u16, f32)>; 8],
+    shares: [Vec<(u16, f32, NodeColour)>; 8],
 }
 
 impl OctreeShift {
@@ -33,20 +33,20 @@ impl OctreeShift {
     }
 
     /// Adds the values of a brick of the map that are in a range of the octree's bricks. `visit` passes the brick's
-    /// voxels as position and value, ascending by position.
+    /// voxels as position, value and colour, ascending by position.
     pub(super) fn add_brick(
         &mut self,
         brick: BrickCode,
         wanted: &Range<BrickCode>,
         values: &mut BrickValues,
-        visit: impl FnOnce(&mut dyn FnMut(usize, f32)),
+        visit: impl FnOnce(&mut dyn FnMut(usize, f32, NodeColour)),
     ) {
         let first = self.of_key(brick.voxel(0));
         if self.first == [0; 3] {
             let brick = first.brick();
             if wanted.contains(&brick) {
                 values.begin(brick);
-                visit(&mut |place, value| values.add(place, value));
+                visit(&mut |place, value, colour| values.add_coloured(place, value, colour));
                 values.end();
             }
             return;
@@ -57,16 +57,18 @@ impl OctreeShift {
         }
         self.shares.iter_mut().for_each(Vec::clear);
         let (shares, first) = (&mut self.shares, self.first);
-        visit(&mut |place, value| {
+        visit(&mut |place, value, colour| {
             let local = local_of(place);
             let shifted: VoxelIndex = std::array::from_fn(|axis| local[axis] + first[axis]);
             let share: i32 = (0..3).map(|axis| (shifted[axis] / BRICK_EDGE) << axis).sum();
-            shares[share as usize].push((place_of_voxel(shifted) as u16, value));
+            shares[share as usize].push((place_of_voxel(shifted) as u16, value, colour));
         });
         for (share, brick) in self.shares.iter_mut().zip(bricks).filter(|(_, brick)| wanted.contains(brick)) {
-            share.sort_unstable_by_key(|&(place, _)| place);
+            share.sort_unstable_by_key(|&(place, ..)| place);
             values.begin(brick);
-            share.iter().for_each(|&(place, value)| values.add(place.into(), value));
+            for &(place, value, colour) in share.iter() {
+                values.add_coloured(place.into(), value, colour);
+            }
             values.end();
         }
     }
@@ -107,7 +109,7 @@ mod tests {
                 let mut values = BrickValues::default();
                 let all = BrickCode(0)..BrickCode(BrickCode::END);
                 shift.add_brick(BrickCode::of_voxel(first), &all, &mut values, |add| {
-                    (0..512).for_each(|place| add(place, place as f32));
+                    (0..512).for_each(|place| add(place, place as f32, NodeColour::NONE));
                 });
                 assert_eq!(values.len(), 512);
                 let mut found: Vec<(MortonCode, f32)> = values.voxels().collect();

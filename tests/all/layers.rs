@@ -404,3 +404,56 @@ fn layers_follow_kept_scans() {
     verify(at(&folder, "map"), |finding| findings.push(finding.clone()), |_, _| {}).unwrap();
     assert!(findings.is_empty(), "{findings:?}");
 }
+
+#[test]
+fn rebuilt_maps_get_the_layers_that_kept_scans_fill() {
+    let folder = tempfile::tempdir().unwrap();
+    let few = Layers { colour: true, ..Layers::NONE };
+    let config = config().with_kept_scans(true);
+    let scans = scans(23, 6, 100);
+    drop(build(at(&folder, "map"), &config.clone().with_layers(few), &scans));
+    let map = MapReader::open(at(&folder, "map"), 0).unwrap();
+    let rebuilt = |name: &str, layers: Layers| {
+        let config = config.clone().with_layers(layers);
+        rebuild(&map, folder.path().join(name), config, |rays| *rays, &Stop::default(), |_, _| ())
+    };
+    let made = rebuilt("all", all_layers()).unwrap();
+    let all = MapReader::open(at(&folder, "all"), 0).unwrap();
+    assert!(layers_of(&all) == naive(&config, &scans));
+    let without =
+        |lacks: &dyn Fn(&Attributed) -> bool| scans.iter().filter(|scan| lacks(scan)).count() as u64;
+    let expected = [
+        ("colour", without(&|scan| scan.attributes.colours.is_empty())),
+        ("intensity", 0),
+        ("class", without(&|scan| scan.attributes.classes.is_empty())),
+        ("time", without(&|scan| scan.stamp_ns.is_none())),
+    ];
+    assert_eq!(made.scans_without.by_layer(), expected);
+    rebuilt("none", Layers::NONE).unwrap();
+    let none = MapReader::open(at(&folder, "none"), 0).unwrap();
+    assert!(layers_of(&none).is_empty() && none.digest().unwrap() == map.digest().unwrap());
+}
+
+#[test]
+fn layers_that_no_kept_scan_fills_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let config = config().with_layers(Layers::NONE).with_kept_scans(true);
+    let mut scans = scans(24, 3, 100);
+    for scan in &mut scans {
+        scan.attributes = PointAttributes::default();
+        scan.stamp_ns = None;
+    }
+    drop(build(at(&folder, "map"), &config, &scans));
+    let map = MapReader::open(at(&folder, "map"), 0).unwrap();
+    let rebuilt = |layers: Layers| {
+        let config = config.clone().with_layers(layers);
+        rebuild(&map, folder.path().join("new"), config, |rays| *rays, &Stop::default(), |_, _| ())
+    };
+    let error = rebuilt(all_layers()).unwrap_err().to_string();
+    assert!(error.contains("nothing for colour, class, time"), "{error}");
+    assert!(!folder.path().join("new").exists());
+    let shape = Layers { shape: true, intensity_max: Some(255.0), ..Layers::NONE };
+    rebuilt(shape).unwrap();
+    let new = MapReader::open(at(&folder, "new"), 0).unwrap();
+    assert!(layers_of(&new) == naive(&config.with_layers(shape), &scans));
+}

@@ -4,6 +4,8 @@
 mod borrowed_scans;
 /// Guarded clearing.
 mod clearing;
+/// Files of OctoMap's `ColorOcTree`, compared with a naive writer.
+mod color_octree;
 /// Conversion between storages.
 mod convert;
 /// Damage to every byte of every file of a map: found and repaired.

@@ -51,6 +51,8 @@ fn options_of(args: &ExportArgs) -> voxtile::Result<ExportOptions> {
         WhatName::Free => WhichVoxels::Free,
         WhatName::All => WhichVoxels::All,
     }));
+    options.with_layers = !args.no_layers;
+    options.mean_points = args.mean_points;
     options.z_min_m = args.z_min;
     options.z_max_m = args.z_max;
     options.cell_m = args.cell;

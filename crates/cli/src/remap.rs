@@ -126,6 +126,9 @@ fn build_another(args: &RemapArgs) -> anyhow::Result<ExitCode> {
     }
     let (scans, points) = (Counted(mapped.scans, "scan"), Counted(mapped.report.points, "point"));
     writeln!(out, "mapped    {scans}, {points}, to {}", output.display())?;
+    for (layer, count) in mapped.scans_without.by_layer().into_iter().filter(|(_, count)| *count > 0) {
+        writeln!(out, "layers    {} without data for {layer}", Counted(count, "scan"))?;
+    }
     let (voxels, occupied) = MapReader::open(output, 0)?.voxel_counts().unwrap_or_default();
     writeln!(out, "map       {} voxels, {} occupied", HumanCount(voxels), HumanCount(occupied))?;
     Ok(ExitCode::SUCCESS)
@@ -135,6 +138,7 @@ fn config_of(args: &RemapArgs, own: &MapConfig, memory: MemoryLimit) -> anyhow::
     let grid = own.grid.replaced(args.resolution, args.tile_size).map_err(Error::from)?;
     let mut config = own.clone().with_kept_scans(args.keep_scans);
     (config.grid, config.memory) = (grid, memory);
+    config.layers = args.layers.or(config.layers);
     if let Some(storage) = args.storage {
         config.storage = storage.into();
     }

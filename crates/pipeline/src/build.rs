@@ -114,7 +114,7 @@ fn build_input(
     let mut ingest =
         Ingest::new(reader, scans.clone(), options.skip_bad, (!options.no_rays).then_some(needs));
     let mut opened_map = match exists {
-        true => Some(OutOfCoreTileMapper::open(map_path(options), config.clone())?),
+        true => Some(open_map(options, &config)?),
         false => None,
     };
     if !ingest.read_lookahead()? {
@@ -508,6 +508,17 @@ fn check_begun(
         }
         _ => mapper.check_rays(input),
     }
+}
+
+/// Opens the map to extend.
+fn open_map(options: &BuildOptions, config: &MapConfig) -> anyhow::Result<OutOfCoreTileMapper> {
+    OutOfCoreTileMapper::open(map_path(options), config.clone()).map_err(|error| match error {
+        Error::Mismatch { what: "layers", .. } => anyhow::Error::from(error).context(
+            "a map has its layers from its creation on; `voxtile remap MAP -o NEW` with `layers` makes another one of \
+             the scans that it keeps",
+        ),
+        other => other.into(),
+    })
 }
 
 /// Checks that the coordinate reference systems of input and map agree.

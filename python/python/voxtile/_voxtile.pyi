@@ -333,6 +333,7 @@ def remap_as(
     max_range: float | None = None,
     insert_mode: _InsertMode | None = None,
     clearing: _Clearing | None = None,
+    layers: str | Sequence[str] | None = None,
     storage: _Storage | None = None,
     keep_scans: bool = False,
     memory: int | str | None = None,

@@ -96,6 +96,8 @@ class ExportOptions(TypedDict, total=False):
     format: str | None
     min_probability: float | None
     what: Literal["occupied", "free", "all"] | None
+    no_layers: bool
+    mean_points: bool
     z_min: float | None
     z_max: float | None
     cell: float | None

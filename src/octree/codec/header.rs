@@ -27,7 +27,15 @@ impl OctreeFormat {
     const fn magic(self) -> &'static str {
         match self {
             Self::Bt => "# Octomap OcTree binary file",
-            Self::Ot => "# Octomap OcTree file",
+            Self::Ot | Self::ColorOt => "# Octomap OcTree file",
+        }
+    }
+
+    /// OctoMap's class name of the tree that is written.
+    const fn class(self) -> &'static str {
+        match self {
+            Self::Bt | Self::Ot => "OcTree",
+            Self::ColorOt => "ColorOcTree",
         }
     }
 
@@ -37,7 +45,7 @@ impl OctreeFormat {
     }
 }
 
-/// Writes the header that OctoMap writes for an `OcTree`.
+/// Writes the header that OctoMap writes.
 pub(super) fn write_header(
     out: &mut impl Write,
     format: OctreeFormat,
@@ -48,8 +56,8 @@ pub(super) fn write_header(
         let reason = format!("resolution {resolution_m} m is not a positive, finite length");
         return Err(io::Error::new(ErrorKind::InvalidInput, reason));
     }
-    let (magic, resolution) = (format.magic(), to_six_digits(resolution_m));
-    let header = format!("{magic}{SECOND_LINES}id OcTree\nsize {nodes}\nres {resolution}\ndata\n");
+    let (magic, class, resolution) = (format.magic(), format.class(), to_six_digits(resolution_m));
+    let header = format!("{magic}{SECOND_LINES}id {class}\nsize {nodes}\nres {resolution}\ndata\n");
     out.write_all(header.as_bytes())
 }
 

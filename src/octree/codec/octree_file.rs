@@ -14,13 +14,16 @@ pub enum OctreeFormat {
     Bt,
     /// `.ot`: log-odds of each node.
     Ot,
+    /// `.ot` of a `ColorOcTree`: log-odds and colour of each node. Only for writing: a file that is read has the format
+    /// `Ot`, whatever its class.
+    ColorOt,
 }
 
 impl fmt::Display for OctreeFormat {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
             Self::Bt => ".bt",
-            Self::Ot => ".ot",
+            Self::Ot | Self::ColorOt => ".ot",
         })
     }
 }
@@ -102,7 +105,7 @@ fn read_format(
     let growing = GrowingTree { tree: Octree::new(), max_bytes };
     let tree = match header.format {
         OctreeFormat::Bt => bt::read_nodes(&mut input, &header, growing)?,
-        OctreeFormat::Ot => ot::read_nodes(&mut input, &header, growing)?,
+        OctreeFormat::Ot | OctreeFormat::ColorOt => ot::read_nodes(&mut input, &header, growing)?,
     };
     let Header { format, id, nodes: stated_nodes, resolution_m } = header;
     Ok(OctreeFile { tree, resolution_m, id, format, stated_nodes })

@@ -3,15 +3,17 @@ use super::bt::PrunedDepths;
 use super::bt_bricks::{BtEncoder, BtNode};
 use super::header::write_header;
 use super::node_encoder::{NodeEncoder, encode};
-use super::ot_bricks::{OtEncoder, OtNode};
+use super::ot_bricks::{NodeData, OtEncoder, OtNode};
 use super::spine::{Block, Spine};
 use crate::octree::BrickNodes;
 use crate::octree::brick_values::{BrickContent, BrickValues};
-use crate::space::MortonCode;
+use crate::octree::node_colour::NodeColour;
+use crate::space::{BrickCode, MortonCode};
 use std::io::{self, BufWriter, Read, Seek, Write};
+use std::ops::Range;
 
-/// Writes the `.bt` or `.ot` file of a tree larger than memory, block by block. The result is byte-identical to that of
-/// [`write_bt`](super::write_bt) or [`write_ot`](super::write_ot).
+/// Writes the `.bt` or `.ot` file of a tree larger than memory, block by block. Without colours the result is
+/// byte-identical to that of [`write_bt`](super::write_bt) or [`write_ot`](super::write_ot).
 ///
 /// The header, and the bytes before a block, depend on later blocks. Therefore the blocks are first written to a spool,
 /// and a few bytes per block are kept in memory.
@@ -27,7 +29,8 @@ pub struct OctreeStream<S: Read + Write + Seek> {
 #[derive(Debug)]
 enum Blocks {
     Bt { encoder: BtEncoder, threshold: f32, pruned: PrunedDepths, blocks: Vec<Block<BtNode>> },
-    Ot { blocks: Vec<Block<OtNode>> },
+    Ot { blocks: Vec<Block<OtNode<()>>> },
+    ColorOt { blocks: Vec<Block<OtNode<NodeColour>>> },
 }
 
 /// Extent of pruning in a `.bt` file.
@@ -63,6 +66,12 @@ impl<S: Read + Write + Seek> OctreeStream<S> {
         Self::new(Blocks::Ot { blocks: Vec::new() }, spool)
     }
 
+    /// Creates an `.ot` stream of a `ColorOcTree`. Nodes are pruned if log-odds and colours are equal, so that every
+    /// voxel keeps its colour; those of inner nodes are averages, as OctoMap's `updateInnerOccupancy` computes them.
+    pub fn color_ot(spool: S) -> Self {
+        Self::new(Blocks::ColorOt { blocks: Vec::new() }, spool)
+    }
+
     fn new(blocks: Blocks, spool: S) -> Self {
         Self { blocks, spool: BufWriter::with_capacity(1 << 16, spool), payload: Vec::new(), voxels: 0 }
     }
@@ -80,27 +89,26 @@ impl<S: Read + Write + Seek> OctreeStream<S> {
         self.voxels += values.len() as u64;
         self.payload.clear();
         let bricks = values.sorted();
-        let all = 0..bricks.len();
-        let (values, mut content) = (&*values, BrickContent::new());
+        let values = &*values;
         match &mut self.blocks {
             Blocks::Bt { encoder, threshold, blocks, .. } => {
-                let mut brick =
-                    |encoder: &mut BtEncoder, parts: std::ops::Range<usize>, out: &mut Vec<u8>| {
-                        let code = bricks[parts.start];
-                        values.gather(parts, &mut content);
-                        let word = |word| content.word(word);
-                        let (nodes, _) = BrickNodes::of_values(code, content.known, Some(*threshold), word);
-                        encoder.encode_brick(&nodes, out)
-                    };
-                let node = encode(encoder, &bricks, all, depth, &mut self.payload, &mut brick);
+                let mut content = BrickContent::new();
+                let mut brick = |encoder: &mut BtEncoder, parts: Range<usize>, out: &mut Vec<u8>| {
+                    let code = bricks[parts.start];
+                    values.gather(parts, &mut content);
+                    let word = |word| content.word(word);
+                    let (nodes, _) = BrickNodes::of_values(code, content.known, Some(*threshold), word);
+                    encoder.encode_brick(&nodes, out)
+                };
+                let node = encode(encoder, &bricks, 0..bricks.len(), depth, &mut self.payload, &mut brick);
                 blocks.push(Block { first, depth, node, bytes: self.payload.len() as u64 });
             }
             Blocks::Ot { blocks } => {
-                let mut brick = |encoder: &mut OtEncoder, parts, out: &mut Vec<u8>| {
-                    values.gather(parts, &mut content);
-                    encoder.encode_brick(&content, out)
-                };
-                let node = encode(&mut OtEncoder, &bricks, all, depth, &mut self.payload, &mut brick);
+                let node = encode_ot(values, &bricks, depth, &mut self.payload);
+                blocks.push(Block { first, depth, node, bytes: self.payload.len() as u64 });
+            }
+            Blocks::ColorOt { blocks } => {
+                let node = encode_ot(values, &bricks, depth, &mut self.payload);
                 blocks.push(Block { first, depth, node, bytes: self.payload.len() as u64 });
             }
         }
@@ -133,14 +141,43 @@ impl<S: Read + Write + Seek> OctreeStream<S> {
                 BtEncoder::node_count(&root)
             }
             Blocks::Ot { blocks } => {
-                let spine = Spine::of(&mut OtEncoder, &blocks);
-                let nodes = OtEncoder::node_count(&spine.node());
-                write_header(&mut out, OctreeFormat::Ot, nodes, resolution_m)?;
-                spine.write(&mut spool, &mut out)?;
-                nodes
+                write_ot_blocks(&blocks, OctreeFormat::Ot, resolution_m, &mut spool, &mut out)?
+            }
+            Blocks::ColorOt { blocks } => {
+                write_ot_blocks(&blocks, OctreeFormat::ColorOt, resolution_m, &mut spool, &mut out)?
             }
         };
         out.flush()?;
         Ok(StreamOutcome::Written { voxels, nodes })
     }
+}
+
+/// Appends the bytes of an `.ot` node over these bricks.
+fn encode_ot<D: NodeData>(
+    values: &BrickValues,
+    bricks: &[BrickCode],
+    depth: u8,
+    payload: &mut Vec<u8>,
+) -> OtNode<D> {
+    let mut content = BrickContent::new();
+    let mut brick = |encoder: &mut OtEncoder<D>, parts: Range<usize>, out: &mut Vec<u8>| {
+        values.gather(parts, &mut content);
+        encoder.encode_brick(&content, out)
+    };
+    encode(&mut OtEncoder::new(), bricks, 0..bricks.len(), depth, payload, &mut brick)
+}
+
+/// Writes the `.ot` file of these blocks. Returns the number of its nodes.
+fn write_ot_blocks<D: NodeData>(
+    blocks: &[Block<OtNode<D>>],
+    format: OctreeFormat,
+    resolution_m: f64,
+    spool: &mut impl Read,
+    out: &mut impl Write,
+) -> io::Result<u64> {
+    let spine = Spine::of(&mut OtEncoder::new(), blocks);
+    let nodes = OtEncoder::node_count(&spine.node());
+    write_header(out, format, nodes, resolution_m)?;
+    spine.write(spool, out)?;
+    Ok(nodes)
 }

@@ -23,7 +23,7 @@ mod revision;
 pub use mark_moving::mark_moving;
 pub use new_poses::NewPoses;
 pub use online_remap::OnlineRemap;
-pub use rebuild::{Rebuilt, rebuild};
+pub use rebuild::{Rebuilt, ScansWithout, rebuild};
 pub use remap::{Remap, Remapped, remap};
 pub use remove_points::{PointsRemoved, remove_points};
 pub use remove_scans::{ScanSelection, ScansRemoved, SnapshotFailure, remove_scans};

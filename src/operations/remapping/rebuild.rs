@@ -1,9 +1,9 @@
 use super::retiling::Retiling;
-use crate::config::{MapConfig, RayConfig};
-use crate::error::Result;
+use crate::config::{Layers, MapConfig, RayConfig};
+use crate::error::{Error, Result};
 use crate::mapper::{MapReader, MapView, Mapper, OutOfCoreTileMapper};
 use crate::scan::{ScanReport, Stop};
-use crate::store::{InputRecord, MapPath, StagedMap, TileStore};
+use crate::store::{InputRecord, KeptRecord, MapPath, StagedMap, TileStore};
 use serde::Serialize;
 use std::path::Path;
 
@@ -16,6 +16,36 @@ pub struct Rebuilt {
     /// Counts of their points.
     #[serde(flatten)]
     pub report: ScanReport,
+    /// Scans that do not hold what the layers of the new map need.
+    pub scans_without: ScansWithout,
+}
+
+/// Numbers of kept scans with points that do not hold what a layer needs; 0 for layers that the map does not have.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct ScansWithout {
+    /// Scans without colours.
+    pub colour: u64,
+    /// Scans without intensities.
+    pub intensity: u64,
+    /// Scans without classes.
+    pub class: u64,
+    /// Scans without a time stamp.
+    pub time: u64,
+}
+
+impl ScansWithout {
+    fn note(&mut self, scan: &KeptRecord, layers: &Layers) {
+        self.colour += u64::from(layers.colour && !scan.has_colours);
+        self.intensity += u64::from(layers.intensity_max.is_some() && !scan.has_intensities);
+        self.class += u64::from(layers.class && !scan.has_classes);
+        self.time += u64::from(layers.time && scan.stamp_ns.is_none());
+    }
+
+    /// Name of each layer, and the number of scans.
+    pub fn by_layer(&self) -> [(&'static str, u64); 4] {
+        let Self { colour, intensity, class, time } = *self;
+        [("colour", colour), ("intensity", intensity), ("class", class), ("time", time)]
+    }
 }
 
 /// Creates another map from the scans that a map keeps, with other parameters. `rays` changes the ray settings of each
@@ -26,7 +56,7 @@ pub struct Rebuilt {
 ///
 /// # Errors
 ///
-/// A map that keeps no scans or has other scans too; a region whose borders are not borders of the new tiles; an
+/// A map that keeps no scans or has other scans too; a layer that the map does not have and no scan can fill; a region whose borders are not borders of the new tiles; an
 /// invalid configuration; a folder with other content; another process that creates the same map; damage; an I/O error;
 /// a request to stop. There is no map then. The exception is a failure of the last step, the sync of the folder that
 /// contains the map.
@@ -43,9 +73,17 @@ pub fn rebuild(
     let of_map = RayConfig { region: map.config().rays.region, ..config.rays };
     let config = MapConfig { rays: rays(&of_map)?, ..config };
     // Report invalid ray settings before anything is created.
-    let scans = map.kept_summary_with(|record| rays(&record.rays).map(drop))?;
+    let (layers, mut with_points, mut scans_without) = (config.layers(), 0, ScansWithout::default());
+    let scans = map.kept_summary_with(|record| {
+        if record.points > 0 {
+            with_points += 1;
+            scans_without.note(record, &layers);
+        }
+        rays(&record.rays).map(drop)
+    })?;
     scans.check_keeps_all()?;
     scans.check_marks(|_| false)?;
+    check_filled(&map.config().layers(), with_points, &scans_without)?;
     let count = scans.scans().len() as u64;
     drop(scans);
     let (disk, folder) = output.into().into_parts();
@@ -54,7 +92,25 @@ pub fn rebuild(
     let mut made = StagedMap::begin_by(disk.clone(), &folder, create)?;
     let mapped = map_scans(map, made.writer(), rays, stop, count, progress)?;
     made.finish()?;
-    Ok(mapped)
+    Ok(Rebuilt { scans_without, ..mapped })
+}
+
+/// Checks that the scans fill the layers that the map does not have yet.
+fn check_filled(own: &Layers, scans: u64, without: &ScansWithout) -> Result<()> {
+    let missing = without
+        .by_layer()
+        .into_iter()
+        .filter(|(layer, count)| scans > 0 && *count == scans && !own.names().any(|name| name == *layer));
+    let missing: Vec<_> = missing.map(|(layer, _)| layer).collect();
+    if missing.is_empty() {
+        return Ok(());
+    }
+    let reason = format!(
+        "the kept scans hold nothing for {}: a map keeps colours and classes only if it has their layer; leave them \
+         out, or build a map from the original files",
+        missing.join(", ")
+    );
+    Err(Error::argument("layers", reason))
 }
 
 /// Inserts all scans, and flushes.

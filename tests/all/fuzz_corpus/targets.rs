@@ -75,7 +75,7 @@ fn octree_bytes(file: &OctreeFile) -> Vec<u8> {
     let mut bytes = Vec::new();
     match file.format {
         OctreeFormat::Bt => write_bt_unpruned(&file.tree, file.resolution_m, 0.0, &mut bytes),
-        OctreeFormat::Ot => write_ot(&file.tree, file.resolution_m, &mut bytes),
+        OctreeFormat::Ot | OctreeFormat::ColorOt => write_ot(&file.tree, file.resolution_m, &mut bytes),
     }
     .expect("writes to memory succeed");
     bytes

@@ -38,6 +38,13 @@ pub struct ExportArgs {
     /// Voxels to export [default: occupied; all for .pgm]
     #[arg(long, value_name = "WHICH", conflicts_with = "min_probability")]
     pub what: Option<WhatName>,
+    /// Write no colours, intensities, classes and times of the map's layers: .ot then is an OcTree, not a ColorOcTree, and
+    /// .glb has colours of heights
+    #[arg(long)]
+    pub no_layers: bool,
+    /// Files of points: write the mean of the points in a voxel in place of its center; the map needs the layer shape
+    #[arg(long)]
+    pub mean_points: bool,
     /// .pgm, .png, .tif: only voxels that reach above this height, in metres
     #[arg(long, value_name = "M")]
     pub z_min: Option<f64>,

@@ -2,6 +2,7 @@ use super::{ClearingName, InsertName, ModelName, StorageName, help};
 use bytesize::ByteSize;
 use clap::Args;
 use std::path::PathBuf;
+use voxtile::Layers;
 use voxtile::store::SnapshotName;
 
 /// Options of all commands that replay kept scans.
@@ -73,6 +74,10 @@ pub struct RemapArgs {
     /// With -o: storage format of the tiles of the new map [default: the map's]
     #[arg(long, value_name = "FORM", requires = "output")]
     pub storage: Option<StorageName>,
+    /// With -o: layers of the new map, as of build, as far as the kept scans hold what they need; none for no layers
+    /// [default: the map's]
+    #[arg(long, value_name = "LIST", requires = "output")]
+    pub layers: Option<Layers>,
     /// With -o: keep the scans in the new map, too
     #[arg(long, requires = "output")]
     pub keep_scans: bool,

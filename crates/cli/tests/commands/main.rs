@@ -18,6 +18,8 @@ mod cli_formats;
 mod cli_help;
 /// Output of `--json`.
 mod cli_json;
+/// Layers in exports, and in maps of kept scans.
+mod cli_layers;
 /// `local`.
 mod cli_local;
 /// Effects of `-q`, `-v` and `RUST_LOG`.

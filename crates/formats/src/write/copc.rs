@@ -49,7 +49,7 @@ struct Chunk {
 impl CopcSink {
     pub(super) fn create(head: &VoxelsHead, path: &std::path::Path, options: &WriteOptions) -> Result<Self> {
         Ok(Self {
-            layout: LasLayout::of(head)?,
+            layout: LasLayout::of(head, options)?,
             out: OutFile::create(path)?,
             head: head.clone(),
             common: common_vlrs(options)?,

@@ -3,7 +3,7 @@ use super::height_range::HeightRange;
 use super::lattice::Lattice;
 use super::options::WriteOptions;
 use super::out_file::OutFile;
-use super::row::{VoxelRow, VoxelSink, VoxelsHead};
+use super::row::{RowLayers, VoxelRow, VoxelSink, VoxelsHead};
 use super::sorted_columns::{Column, SortedColumns};
 use super::tiff_file::{TiffFile, Values};
 use super::{Error, FileUnit, Result};
@@ -20,19 +20,36 @@ const TILE_EDGE: usize = 256;
 /// Maximum number of tiles of the image: the file stores the place of each.
 const MAX_TILES: u64 = 1 << 22;
 
-/// Names of the bands, without their unit.
-const BANDS: [&str; 3] = [
+/// Names of the bands of heights, without their unit.
+const HEIGHTS: [&str; 3] = [
     "top of the highest occupied voxel",
     "bottom of the lowest occupied voxel",
     "mean height of the centers of the occupied voxels",
 ];
 
-/// Writer of the heights of occupied voxels as a GeoTIFF of three bands.
+/// Band of the values of the highest occupied voxels.
+struct LayerBand {
+    name: &'static str,
+    value: fn(&RowLayers) -> Option<f32>,
+}
+
+const COLOUR_BANDS: [LayerBand; 3] = [
+    LayerBand { name: "red", value: |top| Some(top.colour?[0].into()) },
+    LayerBand { name: "green", value: |top| Some(top.colour?[1].into()) },
+    LayerBand { name: "blue", value: |top| Some(top.colour?[2].into()) },
+];
+const INTENSITY_BAND: LayerBand =
+    LayerBand { name: "intensity", value: |top| top.intensity.map(|mean| mean as f32) };
+const CLASS_BAND: LayerBand = LayerBand { name: "class", value: |top| top.class.map(f32::from) };
+
+/// Writer of the heights of occupied voxels as a GeoTIFF of three bands, and of the layers of the highest ones in
+/// further bands.
 pub(super) struct GeoTiffSink {
     file: TiffFile,
     head: VoxelsHead,
     options: WriteOptions,
     heights: HeightRange,
+    layer_bands: Vec<LayerBand>,
     raster: Option<Raster>,
 }
 
@@ -52,11 +69,16 @@ struct Raster {
 impl GeoTiffSink {
     pub(super) fn create(head: &VoxelsHead, path: &Path, options: &WriteOptions) -> Result<Self> {
         let heights = HeightRange::of(options)?;
+        let mut layer_bands = Vec::new();
+        layer_bands.extend(COLOUR_BANDS.into_iter().filter(|_| head.layers.colour));
+        layer_bands.extend(Some(INTENSITY_BAND).filter(|_| head.layers.intensity_max.is_some()));
+        layer_bands.extend(Some(CLASS_BAND).filter(|_| head.layers.class));
         Ok(Self {
             file: TiffFile::create(path)?,
             head: head.clone(),
             options: options.clone(),
             heights,
+            layer_bands,
             raster: None,
         })
     }
@@ -122,7 +144,8 @@ impl VoxelSink for GeoTiffSink {
         let (tile, place) = raster.place_of(voxel)?;
         if voxel.log_odds >= self.head.occupied_log_odds && self.heights.meets(voxel, self.head.resolution_m)
         {
-            raster.columns.add(tile, place, voxel.index[2], [voxel.tile[0], voxel.tile[1]])?;
+            let map_tile = [voxel.tile[0], voxel.tile[1]];
+            raster.columns.add(tile, place, voxel.index[2], &voxel.layers, map_tile)?;
         }
         Ok(())
     }
@@ -133,11 +156,12 @@ impl VoxelSink for GeoTiffSink {
         let blank = f32::NAN.to_le_bytes().repeat(TILE_EDGE * TILE_EDGE);
         // All empty tiles are one.
         let empty = append(&mut self.file, &path, &blank)?;
-        let mut places: BTreeMap<u64, [(u64, u64); 3]> = BTreeMap::new();
+        let mut places: BTreeMap<u64, Vec<(u64, u64)>> = BTreeMap::new();
         let sorted = std::mem::replace(&mut raster.columns, SortedColumns::new(&self.options.scratch_folder));
         let mut parts = sorted.into_parts()?;
         let mut next = parts.next()?;
-        let mut bands = [blank.clone(), blank.clone(), blank.clone()];
+        let count = HEIGHTS.len() + self.layer_bands.len();
+        let mut bands = vec![blank.clone(); count];
         while let Some((tile, ..)) = next {
             bands.iter_mut().for_each(|band| band.copy_from_slice(&blank));
             while let Some((_, place, mut column)) = next.filter(|(of, ..)| *of == tile) {
@@ -147,22 +171,22 @@ impl VoxelSink for GeoTiffSink {
                     next = parts.next()?;
                 }
                 let heights = raster.heights_of(&column, self.head.resolution_m);
-                for (band, height) in bands.iter_mut().zip(heights) {
+                let layers =
+                    self.layer_bands.iter().map(|band| (band.value)(&column.top).unwrap_or(f32::NAN));
+                for (band, value) in bands.iter_mut().zip(heights.into_iter().chain(layers)) {
                     let at = 4 * usize::from(place);
-                    band[at..at + 4].copy_from_slice(&height.to_le_bytes());
+                    band[at..at + 4].copy_from_slice(&value.to_le_bytes());
                 }
             }
-            let mut of_tile = [empty; 3];
-            for (place, band) in of_tile.iter_mut().zip(&bands) {
-                *place = append(&mut self.file, &path, band)?;
-            }
+            let of_tile = bands.iter().map(|band| append(&mut self.file, &path, band));
+            let of_tile = of_tile.collect::<Result<_>>()?;
             places.insert(u64::from(tile), of_tile);
         }
         let tiles = raster.tiles[0] * raster.tiles[1];
         let place = |at: u64| places.get(&(at % tiles)).map_or(empty, |bands| bands[(at / tiles) as usize]);
         let (offsets, lengths) = (|at: u64| place(at).0, |at: u64| place(at).1);
-        let fields =
-            self.fields(&raster, Values::Places(3 * tiles, &offsets), Values::Places(3 * tiles, &lengths));
+        let all = count as u64 * tiles;
+        let fields = self.fields(&raster, Values::Places(all, &offsets), Values::Places(all, &lengths));
         let wkt = self.options.crs.as_deref().filter(|crs| needs_wkt(crs));
         if let Some(wkt) = wkt {
             write_aux(&aux_path(&self.options)?, wkt)?;
@@ -180,16 +204,17 @@ impl GeoTiffSink {
     ) -> Vec<(u16, Values<'a>)> {
         let resolution_m = self.head.resolution_m;
         let [x, y, _] = raster.lattice.corner_m([raster.first_x, raster.first_y + 1, 0]);
+        let bands = HEIGHTS.len() + self.layer_bands.len();
         let (keys, text) = geo_keys(self.options.crs.as_deref(), self.options.unit);
         let mut fields = vec![
             (256, Values::Longs(vec![raster.size[0]])),
             (257, Values::Longs(vec![raster.size[1]])),
-            (258, Values::Shorts(vec![32; 3])),
+            (258, Values::Shorts(vec![32; bands])),
             // Deflate.
             (259, Values::Shorts(vec![8])),
             // Photometric interpretation: small values are dark.
             (262, Values::Shorts(vec![1])),
-            (277, Values::Shorts(vec![3])),
+            (277, Values::Shorts(vec![bands as u16])),
             // Each band has its own tiles.
             (284, Values::Shorts(vec![2])),
             (305, Values::Text(concat!("voxtile ", env!("CARGO_PKG_VERSION")).to_owned())),
@@ -197,10 +222,10 @@ impl GeoTiffSink {
             (323, Values::Longs(vec![TILE_EDGE as u32])),
             (324, offsets),
             (325, lengths),
-            // The second and the third band are no colours.
-            (338, Values::Shorts(vec![0; 2])),
+            // The bands after the first have no meaning that TIFF defines.
+            (338, Values::Shorts(vec![0; bands - 1])),
             // Floating-point numbers.
-            (339, Values::Shorts(vec![3; 3])),
+            (339, Values::Shorts(vec![3; bands])),
             (33550, Values::Doubles(vec![resolution_m, resolution_m, 0.0])),
             // The upper left corner of the image is at this point.
             (33922, Values::Doubles(vec![0.0, 0.0, 0.0, x, y, 0.0])),
@@ -212,10 +237,14 @@ impl GeoTiffSink {
             fields.push((34737, Values::Text(text)));
         }
         let unit = self.options.unit.name();
-        let describe = |(band, name): (usize, &&str)| {
-            format!("<Item name=\"DESCRIPTION\" sample=\"{band}\" role=\"description\">{name}, {unit}</Item>")
-        };
-        let items: String = BANDS.iter().enumerate().map(describe).collect();
+        let heights = HEIGHTS.iter().map(|name| format!("{name}, {unit}"));
+        let layers =
+            self.layer_bands.iter().map(|band| format!("{} of the highest occupied voxel", band.name));
+        let mut items = String::new();
+        for (band, name) in heights.chain(layers).enumerate() {
+            items +=
+                &format!("<Item name=\"DESCRIPTION\" sample=\"{band}\" role=\"description\">{name}</Item>");
+        }
         fields.push((42112, Values::Text(format!("<GDALMetadata>{items}</GDALMetadata>"))));
         fields.push((42113, Values::Text("nan".to_owned())));
         fields
@@ -285,11 +314,22 @@ mod tests {
     use super::*;
     use flate2::read::ZlibDecoder;
     use std::io::Read;
+    use voxtile::Layers;
 
     /// Writes voxels. Returns the file and the fields of its directory.
     fn written(rows: &[VoxelRow], options: &WriteOptions) -> (Vec<u8>, BTreeMap<u64, Vec<u64>>) {
+        written_with(Layers::NONE, rows, options)
+    }
+
+    /// The same, with layers.
+    fn written_with(
+        layers: Layers,
+        rows: &[VoxelRow],
+        options: &WriteOptions,
+    ) -> (Vec<u8>, BTreeMap<u64, Vec<u64>>) {
         let path = &options.final_path;
-        let mut sink = Box::new(GeoTiffSink::create(&head_of(rows), path, options).unwrap());
+        let head = VoxelsHead { layers, ..head_of(rows) };
+        let mut sink = Box::new(GeoTiffSink::create(&head, path, options).unwrap());
         rows.iter().for_each(|row| sink.put(row).unwrap());
         sink.finish().unwrap();
         let bytes = std::fs::read(path).unwrap();
@@ -297,12 +337,13 @@ mod tests {
         (bytes, fields)
     }
 
-    /// Returns the heights of a cell in each band.
-    fn cell(file: &(Vec<u8>, BTreeMap<u64, Vec<u64>>), column: usize, row: usize) -> [f32; 3] {
+    /// Returns the values of a cell in each band.
+    fn cell(file: &(Vec<u8>, BTreeMap<u64, Vec<u64>>), column: usize, row: usize) -> Vec<f32> {
         let (bytes, fields) = file;
         let across = (fields[&256][0] as usize).div_ceil(TILE_EDGE);
-        let tiles = fields[&324].len() / 3;
-        [0, 1, 2].map(|band| {
+        let bands = fields[&277][0] as usize;
+        let tiles = fields[&324].len() / bands;
+        let value = |band: usize| {
             let tile = band * tiles + row / TILE_EDGE * across + column / TILE_EDGE;
             let (at, length) = (fields[&324][tile] as usize, fields[&325][tile] as usize);
             let mut values = Vec::new();
@@ -310,7 +351,30 @@ mod tests {
             assert_eq!(values.len(), 4 * TILE_EDGE * TILE_EDGE);
             let at = 4 * (row % TILE_EDGE * TILE_EDGE + column % TILE_EDGE);
             f32::from_le_bytes(values[at..at + 4].try_into().unwrap())
-        })
+        };
+        (0..bands).map(value).collect()
+    }
+
+    #[test]
+    fn layers_are_those_of_the_highest_voxel() {
+        let folder = tempfile::tempdir().unwrap();
+        let options = WriteOptions::for_path(&folder.path().join("dem.tif"));
+        let mut rows = [row([0; 3], 0.9), row([0, 0, 2], 0.9), row([0, 0, 5], 0.1), row([1, 0, 0], 0.9)];
+        for (k, row) in rows[..3].iter_mut().enumerate() {
+            let class = (k == 1).then_some(6);
+            row.layers = RowLayers { colour: Some([k as u8, 20, 30]), class, ..RowLayers::NONE };
+            row.layers.intensity = Some(0.5 + k as f64);
+        }
+        let layers = Layers { colour: true, intensity_max: Some(9.0), class: true, ..Layers::NONE };
+        let file = written_with(layers, &rows, &options);
+        assert_eq!([file.1[&258].len(), file.1[&338].len(), file.1[&339].len()], [8, 7, 8]);
+        assert_eq!(cell(&file, 0, 0)[3..], [1.0, 20.0, 30.0, 1.5, 6.0]);
+        assert!(cell(&file, 1, 0)[3..].iter().all(|value| value.is_nan()));
+        let text: String = file.1[&42112].iter().map(|&byte| byte as u8 as char).collect();
+        assert!(text.contains("sample=\"7\" role=\"description\">class of the highest"), "{text}");
+        // Only the bands of existing layers.
+        let class_alone = Layers { class: true, ..Layers::NONE };
+        assert_eq!(cell(&written_with(class_alone, &rows, &options), 0, 0)[3..], [6.0]);
     }
 
     #[test]

@@ -6,11 +6,12 @@ use super::out_file::OutFile;
 use super::row::{VoxelRow, VoxelSink, VoxelsHead};
 use super::sort::{ExternalSort, key, of_key, part};
 use super::spool::Spool;
+use super::srgb::linear_of_srgb;
 use super::{Error, Result};
 use std::path::PathBuf;
 
-/// Size of a sort record: a brick index and a voxel position in the brick.
-const RECORD_BYTES: usize = 15;
+/// Size of a sort record: a brick index, a voxel position in the brick, and a colour.
+const RECORD_BYTES: usize = 18;
 
 /// Size of the six indices of a face.
 const INDEX_BYTES: u64 = 24;
@@ -19,7 +20,11 @@ const INDEX_BYTES: u64 = 24;
 const COLOURS: [[f64; 3]; 5] =
     [[68.0, 1.0, 84.0], [59.0, 82.0, 139.0], [33.0, 145.0, 140.0], [94.0, 201.0, 98.0], [253.0, 231.0, 37.0]];
 
-/// Writer of the surface of occupied voxels as binary glTF. Voxels are sorted into bricks that include their
+/// Colour of voxels without one in a map with colours.
+const GRAY: [u8; 3] = [128; 3];
+
+/// Writer of the surface of occupied voxels as binary glTF, in the colours of the voxels, or of their heights in a map
+/// without colours. Voxels are sorted into bricks that include their
 /// neighbouring voxels, so that faces at brick borders are exact.
 pub(super) struct GlbSink {
     out: OutFile,
@@ -34,19 +39,20 @@ pub(super) struct GlbSink {
     most: [i32; 3],
 }
 
-/// Encoding of vertex positions.
+/// Encoding of vertices.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum VertexKind {
-    /// 16-bit integers, which require the extension `KHR_mesh_quantization`.
-    Short,
-    /// Integers in single precision, exact up to 2^24.
-    Single,
+pub(super) struct VertexLayout {
+    /// Positions are 16-bit integers, which require the extension `KHR_mesh_quantization`; else integers in single
+    /// precision, exact up to 2^24.
+    pub(super) is_short: bool,
+    /// Colours are those of voxels, converted to linear light with 16 bits; else those of heights with 8 bits.
+    pub(super) is_coloured: bool,
 }
 
 /// Properties of the mesh, for the file header.
 pub(super) struct Surface {
     pub(super) quads: u64,
-    pub(super) kind: VertexKind,
+    pub(super) layout: VertexLayout,
     pub(super) resolution_m: f64,
     /// Lower corner of all occupied voxels in the map frame (z up).
     pub(super) corner_m: [f64; 3],
@@ -75,23 +81,25 @@ impl GlbSink {
     }
 }
 
-impl VertexKind {
-    pub(super) fn bytes(self) -> usize {
-        match self {
-            Self::Short => 12,
-            Self::Single => 16,
-        }
+impl VertexLayout {
+    /// Size of a position, and with it the offset of the colour.
+    pub(super) fn position_bytes(self) -> usize {
+        if self.is_short { 8 } else { 12 }
     }
 
-    fn push(self, bytes: &mut Vec<u8>, place: [i64; 3], colour: [u8; 4]) {
-        match self {
-            Self::Short => {
+    /// Size of a vertex.
+    pub(super) fn bytes(self) -> usize {
+        self.position_bytes() + if self.is_coloured { 8 } else { 4 }
+    }
+
+    fn push_position(self, bytes: &mut Vec<u8>, place: [i64; 3]) {
+        match self.is_short {
+            true => {
                 bytes.extend(place.map(|k| (k as u16).to_le_bytes()).as_flattened());
                 bytes.extend([0; 2]);
             }
-            Self::Single => bytes.extend(place.map(|k| (k as f32).to_le_bytes()).as_flattened()),
+            false => bytes.extend(place.map(|k| (k as f32).to_le_bytes()).as_flattened()),
         }
-        bytes.extend(colour);
     }
 }
 
@@ -104,7 +112,9 @@ impl VoxelSink for GlbSink {
         let edge = BRICK as i32;
         let (brick, place) =
             (voxel.index.map(|k| k.div_euclid(edge)), voxel.index.map(|k| k.rem_euclid(edge)));
-        self.places.push(record(brick, place))?;
+        // Without the layer all voxels have one colour, and faces are merged whatever it is.
+        let colour = voxel.layers.colour.filter(|_| self.head.layers.colour).unwrap_or(GRAY);
+        self.places.push(record(brick, place, colour))?;
         for k in 0..3 {
             self.least[k] = self.least[k].min(voxel.index[k]);
             self.most[k] = self.most[k].max(voxel.index[k]);
@@ -116,7 +126,7 @@ impl VoxelSink for GlbSink {
             } else {
                 continue;
             }
-            self.places.push(record(neighbor, around))?;
+            self.places.push(record(neighbor, around, colour))?;
         }
         Ok(())
     }
@@ -141,7 +151,7 @@ impl VoxelSink for GlbSink {
             return Err(Error::argument("GLB", format!("{reason}; choose a region")));
         }
         let is_short = is_quantized && longest <= i64::from(u16::MAX);
-        let kind = if is_short { VertexKind::Short } else { VertexKind::Single };
+        let layout = VertexLayout { is_short, is_coloured: head.layers.colour };
         let corner_m = lattice.map_or([0.0; 3], |lattice| lattice.corner_m(least.map(i64::from)));
         let mut mesh = Mesh {
             vertices: Spool::new(&scratch_folder)?,
@@ -150,7 +160,7 @@ impl VoxelSink for GlbSink {
             colour_heights_m,
             surface: Surface {
                 quads: 0,
-                kind,
+                layout,
                 resolution_m: head.resolution_m,
                 corner_m,
                 size,
@@ -166,7 +176,7 @@ impl VoxelSink for GlbSink {
                 mesh.add(&brick, done, least)?;
                 brick.clear();
             }
-            brick.insert(part(&record, 12));
+            brick.insert(part(&record, 12), part(&record, 15));
         }
         if let Some(done) = last {
             mesh.add(&brick, done, least)?;
@@ -176,10 +186,11 @@ impl VoxelSink for GlbSink {
     }
 }
 
-fn record(brick: [i32; 3], place: [i32; 3]) -> [u8; RECORD_BYTES] {
+fn record(brick: [i32; 3], place: [i32; 3], colour: [u8; 3]) -> [u8; RECORD_BYTES] {
     let mut record = [0; RECORD_BYTES];
     record[..12].copy_from_slice(brick.map(key).as_flattened());
-    record[12..].copy_from_slice(&place.map(|k| (k + 1) as u8));
+    record[12..15].copy_from_slice(&place.map(|k| (k + 1) as u8));
+    record[15..].copy_from_slice(&colour);
     record
 }
 
@@ -202,13 +213,18 @@ impl Mesh {
                 let place: [i64; 3] = std::array::from_fn(|k| {
                     index[k] * BRICK as i64 + i64::from(corner[k]) - i64::from(least[k])
                 });
-                let colour = colour(self.share_of_height(place[2]));
                 let turned = [place[0], place[2], self.surface.size[1] - place[1]];
                 for (k, &at) in turned.iter().enumerate() {
                     self.surface.least[k] = self.surface.least[k].min(at);
                     self.surface.most[k] = self.surface.most[k].max(at);
                 }
-                self.surface.kind.push(&mut self.bytes, turned, colour);
+                self.surface.layout.push_position(&mut self.bytes, turned);
+                if self.surface.layout.is_coloured {
+                    let [red, green, blue] = quad.colour.map(linear_of_srgb);
+                    self.bytes.extend([red, green, blue, u16::MAX].map(u16::to_le_bytes).as_flattened());
+                } else {
+                    self.bytes.extend(colour(self.share_of_height(place[2])));
+                }
             }
             self.vertices.write(&self.bytes)?;
             let first =
@@ -223,7 +239,7 @@ impl Mesh {
 
     /// Checks that the file can hold one more face, before the scratch files grow beyond the limit.
     fn check_room(&self) -> Result<()> {
-        let bytes = 4 * self.surface.kind.bytes() as u64 + INDEX_BYTES;
+        let bytes = 4 * self.surface.layout.bytes() as u64 + INDEX_BYTES;
         if (self.surface.quads + 1) * bytes > u64::from(u32::MAX) { Err(too_large()) } else { Ok(()) }
     }
 
@@ -337,11 +353,14 @@ mod tests {
     fn too_large_meshes_are_refused_early() {
         let folder = tempfile::tempdir().unwrap();
         let mut brick = Brick::new();
-        brick.insert([5, 6, 7]);
-        for (kind, most) in [(VertexKind::Short, 0xffff_ffff / 72), (VertexKind::Single, 0xffff_ffff / 88)] {
+        brick.insert([5, 6, 7], GRAY);
+        for (is_short, is_coloured, face_bytes) in
+            [(true, false, 72), (false, false, 88), (true, true, 88), (false, true, 104)]
+        {
+            let (layout, most) = (VertexLayout { is_short, is_coloured }, 0xffff_ffff / face_bytes);
             let surface = Surface {
                 quads: most - 6,
-                kind,
+                layout,
                 resolution_m: 0.5,
                 corner_m: [0.0; 3],
                 size: [1; 3],
@@ -394,6 +413,47 @@ mod tests {
             let found = faces(&rows, is_quantized);
             assert_eq!(found.len(), expected.len());
             assert_eq!(found.into_iter().collect::<HashSet<_>>(), expected);
+        }
+    }
+
+    #[test]
+    fn faces_have_the_colours_of_their_voxels() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.glb");
+        // Two voxels in different bricks, which hide one face of each other, and one without a colour.
+        let mut rows = [row([31, 0, 0], 0.9), row([32, 0, 0], 0.9), row([0, 0, 9], 0.9)];
+        rows[0].layers.colour = Some([0, 188, 255]);
+        rows[1].layers.colour = Some([1, 2, 3]);
+        let layers = voxtile::Layers { colour: true, ..voxtile::Layers::NONE };
+        for (is_quantized, stride) in [(false, 20), (true, 16)] {
+            let head = VoxelsHead { layers, ..head_of(&rows) };
+            let options = WriteOptions { is_quantized, ..WriteOptions::for_path(&path) };
+            let mut sink = Box::new(GlbSink::create(&head, &path, &options).unwrap());
+            rows.iter().for_each(|row| sink.put(row).unwrap());
+            sink.finish().unwrap();
+            let bytes = std::fs::read(&path).unwrap();
+            let json_bytes = u32::from_le_bytes(bytes[12..16].try_into().unwrap()) as usize;
+            let json: serde_json::Value = serde_json::from_slice(&bytes[20..20 + json_bytes]).unwrap();
+            let accessor = &json["accessors"][1];
+            let of_colour = (&accessor["byteOffset"], &accessor["componentType"]);
+            assert_eq!(of_colour, (&(stride - 8).into(), &5123.into()));
+            assert_eq!(json["bufferViews"][0]["byteStride"], stride);
+            let count = accessor["count"].as_u64().unwrap() as usize;
+            assert_eq!(count, 4 * (5 + 5 + 6));
+            let start = 20 + json_bytes + 8 + stride - 8;
+            let mut counts = std::collections::BTreeMap::new();
+            for vertex in 0..count {
+                let at = start + vertex * stride;
+                let channel =
+                    |k: usize| u16::from_le_bytes(bytes[at + 2 * k..at + 2 * k + 2].try_into().unwrap());
+                *counts.entry([0, 1, 2, 3].map(channel)).or_insert(0) += 1;
+            }
+            let linear = |colour: [u8; 3]| {
+                let [red, green, blue] = colour.map(linear_of_srgb);
+                [red, green, blue, u16::MAX]
+            };
+            let expected = [(linear([0, 188, 255]), 20), (linear([1, 2, 3]), 20), (linear(GRAY), 24)];
+            assert_eq!(counts, expected.into_iter().collect());
         }
     }
 }

@@ -1,4 +1,4 @@
-use super::glb::{Surface, VertexKind};
+use super::glb::Surface;
 use serde_json::{Value, json};
 
 /// Returns the JSON header of a glTF file: one mesh, its buffer and its position in the world.
@@ -12,8 +12,9 @@ pub(super) fn of(surface: &Surface) -> Value {
         return json!({ "asset": asset, "scene": 0, "scenes": [{}] });
     }
     let (vertices, indices) = (4 * surface.quads, 6 * surface.quads);
-    let is_short = surface.kind == VertexKind::Short;
-    let (stride, component) = (surface.kind.bytes() as u64, if is_short { 5123 } else { 5126 });
+    let is_short = surface.layout.is_short;
+    let (stride, component) = (surface.layout.bytes() as u64, if is_short { 5123 } else { 5126 });
+    let colour_component = if surface.layout.is_coloured { 5123 } else { 5121 };
     let resolution_m = surface.resolution_m;
     let [x, y, z] = surface.corner_m;
     let mut head = json!({
@@ -49,8 +50,8 @@ pub(super) fn of(surface: &Surface) -> Value {
             },
             {
                 "bufferView": 0,
-                "byteOffset": stride - 4,
-                "componentType": 5121,
+                "byteOffset": surface.layout.position_bytes(),
+                "componentType": colour_component,
                 "normalized": true,
                 "count": vertices,
                 "type": "VEC4",

@@ -29,7 +29,7 @@ impl LasSink {
     }
 
     fn create(head: &VoxelsHead, path: &Path, options: &WriteOptions, is_compressed: bool) -> Result<Self> {
-        let (layout, mut vlrs) = (LasLayout::of(head)?, common_vlrs(options)?);
+        let (layout, mut vlrs) = (LasLayout::of(head, options)?, common_vlrs(options)?);
         let mut out = OutFile::create(path)?;
         let points = if is_compressed {
             let laz = laz_vlr(&layout, path, LazVlrBuilder::with_fixed_chunk_size, 50_000)?;

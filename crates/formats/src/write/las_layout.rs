@@ -34,17 +34,18 @@ pub(super) struct LasLayout {
 }
 
 impl LasLayout {
-    /// Chooses a scale so that the error of a centre is at most a thousandth of a voxel, or a coarser one if 32-bit
-    /// integers require it.
+    /// Chooses a scale so that the error of a centre is at most a thousandth of a voxel, that of a mean point a ten
+    /// thousandth, or a coarser one if 32-bit integers require it.
     ///
     /// # Errors
     ///
     /// The voxels are too far apart.
-    pub(super) fn of(head: &VoxelsHead) -> Result<Self> {
+    pub(super) fn of(head: &VoxelsHead, options: &WriteOptions) -> Result<Self> {
         let [low, high] = head.bounds_m;
         let offset_m: [f64; 3] = std::array::from_fn(|k| (0.5 * (low[k] + high[k])).round());
         let reach = (0..3).map(|k| (high[k] - offset_m[k]).max(offset_m[k] - low[k])).fold(0.0, f64::max);
-        let mut scale_m = (head.resolution_m / 1000.0).log2().floor().exp2();
+        let steps = if options.has_mean_points { 10_000.0 } else { 1000.0 };
+        let mut scale_m = (head.resolution_m / steps).log2().floor().exp2();
         while reach / scale_m > f64::from(i32::MAX - 1) && scale_m < head.resolution_m {
             scale_m *= 2.0;
         }
@@ -266,11 +267,15 @@ mod tests {
     #[test]
     fn distant_voxels_use_a_coarser_scale_or_are_refused() {
         let mut head = head_of(&[row([0; 3], 0.5)]);
-        let near = LasLayout::of(&head).unwrap();
-        assert_eq!(near.scale_m, 1.0 / 2048.0);
+        let mut options = WriteOptions::for_path("a.las".as_ref());
+        let scale_m =
+            |head: &VoxelsHead, options: &WriteOptions| LasLayout::of(head, options).unwrap().scale_m;
+        assert_eq!(scale_m(&head, &options), 1.0 / 2048.0);
+        options.has_mean_points = true;
+        assert_eq!(scale_m(&head, &options), 1.0 / 32_768.0);
         head.bounds_m = [[-1e8; 3], [1e8; 3]];
-        assert_eq!(LasLayout::of(&head).unwrap().scale_m, 1.0 / 16.0);
+        assert_eq!(scale_m(&head, &options), 1.0 / 16.0);
         head.bounds_m = [[-1e9; 3], [1e9; 3]];
-        assert!(LasLayout::of(&head).unwrap_err().to_string().contains("choose a region"));
+        assert!(LasLayout::of(&head, &options).unwrap_err().to_string().contains("choose a region"));
     }
 }

@@ -2,8 +2,9 @@ use super::Result;
 use super::mcap_file::{McapFile, Topic};
 use super::options::WriteOptions;
 use super::point_cloud2::{FieldType, SCHEMA, encode};
-use super::row::{VoxelRow, VoxelSink, VoxelsHead};
+use super::row::{RowLayers, VoxelRow, VoxelSink, VoxelsHead};
 use std::path::Path;
+use voxtile::Layers;
 
 /// Maximum number of points of a cloud.
 const MAX_POINTS: usize = 1 << 20;
@@ -17,6 +18,7 @@ pub(super) struct McapSink {
     frame: String,
     stamp_ns: u64,
     fields: Vec<(&'static str, FieldType)>,
+    layers: Layers,
     /// Points of the next cloud. `tile_start` is the offset of its last tile.
     points: Vec<u8>,
     max_points: usize,
@@ -34,7 +36,7 @@ impl McapSink {
             bound.abs() * f64::from(f32::EPSILON) <= head.resolution_m / 16.0
         });
         let of = if fits { FieldType::Float32 } else { FieldType::Float64 };
-        let fields = vec![
+        let mut fields = vec![
             ("x", of),
             ("y", of),
             ("z", of),
@@ -42,11 +44,21 @@ impl McapSink {
             ("log_odds", FieldType::Float64),
             ("count", FieldType::Int32),
         ];
+        let layers = head.layers;
+        for (is_written, of_layer) in [
+            // The bits of a float, as viewers expect.
+            (layers.colour, [("rgb", FieldType::Float32)].as_slice()),
+            (layers.class, &[("label", FieldType::UInt32)]),
+            (layers.time, &[("first_time", FieldType::Float64), ("last_time", FieldType::Float64)]),
+        ] {
+            fields.extend(of_layer.iter().filter(|_| is_written));
+        }
         Ok(Self {
             file,
             frame: options.frame.clone(),
             stamp_ns: options.stamp_ns,
             fields,
+            layers,
             points: Vec::new(),
             max_points: MAX_POINTS,
             tile: None,
@@ -94,9 +106,21 @@ impl VoxelSink for McapSink {
                 false => self.points.extend(place.to_le_bytes()),
             }
         }
-        self.points.extend((voxel.probability as f32).to_le_bytes());
+        let RowLayers { colour, class, .. } = voxel.layers;
+        let intensity = voxel.layers.intensity_or_probability(&self.layers, voxel.probability);
+        self.points.extend((intensity as f32).to_le_bytes());
         self.points.extend(voxel.log_odds.to_le_bytes());
         self.points.extend(voxel.observation_count.to_le_bytes());
+        if self.layers.colour {
+            let [red, green, blue] = colour.unwrap_or_default();
+            self.points.extend([blue, green, red, 0]);
+        }
+        if self.layers.class {
+            self.points.extend(u32::from(class.unwrap_or_default()).to_le_bytes());
+        }
+        if self.layers.time {
+            self.points.extend(voxel.layers.times_s().map(f64::to_le_bytes).as_flattened());
+        }
         Ok(())
     }
 

@@ -52,6 +52,7 @@ mod row;
 mod sort;
 mod sorted_columns;
 mod spool;
+mod srgb;
 mod stream_out;
 #[cfg(test)]
 mod testing;

@@ -11,10 +11,19 @@ use std::path::Path;
 pub(super) struct NpzSink {
     zip: ZipStore,
     columns: Vec<Column>,
+    /// Bytes of one value.
+    bytes: Vec<u8>,
 }
+
+/// Appends the bytes of a voxel's value.
+type AppendValue = fn(&VoxelRow, &mut Vec<u8>);
+
+/// Time stamp of a voxel without one; NumPy's `datetime64` reads it as NaT.
+const NO_TIME_NS: i64 = i64::MIN;
 
 struct Column {
     name: &'static str,
+    append: AppendValue,
     /// Header of the `.npy` file: type and shape.
     head: Vec<u8>,
     crc: crc32fast::Hasher,
@@ -27,26 +36,42 @@ impl NpzSink {
     }
 
     fn in_zip(zip: ZipStore, head: &VoxelsHead, options: &WriteOptions) -> Result<Self> {
-        let rows = head.voxels;
-        let columns = [
-            ("xyz.npy", "<f8", format!("({rows}, 3)")),
-            ("log_odds.npy", "<f8", format!("({rows},)")),
-            ("probability.npy", "<f4", format!("({rows},)")),
-            ("count.npy", "<i4", format!("({rows},)")),
+        let layers = head.layers;
+        let columns: [(bool, &str, &str, &str, AppendValue); 8] = [
+            (true, "xyz.npy", "<f8", ", 3", |row, to| {
+                to.extend(row.center_m.map(f64::to_le_bytes).as_flattened())
+            }),
+            (true, "log_odds.npy", "<f8", ",", |row, to| to.extend(row.log_odds.to_le_bytes())),
+            (true, "probability.npy", "<f4", ",", |row, to| {
+                to.extend((row.probability as f32).to_le_bytes())
+            }),
+            (true, "count.npy", "<i4", ",", |row, to| to.extend(row.observation_count.to_le_bytes())),
+            (layers.colour, "colour.npy", "|u1", ", 3", |row, to| {
+                to.extend(row.layers.colour.unwrap_or_default())
+            }),
+            (layers.intensity_max.is_some(), "intensity.npy", "<f8", ",", |row, to| {
+                to.extend(row.layers.intensity.unwrap_or(f64::NAN).to_le_bytes());
+            }),
+            (layers.class, "class.npy", "|u1", ",", |row, to| to.push(row.layers.class.unwrap_or_default())),
+            (layers.time, "time_ns.npy", "<i8", ", 2", |row, to| {
+                to.extend(row.layers.time_ns.unwrap_or([NO_TIME_NS; 2]).map(i64::to_le_bytes).as_flattened());
+            }),
         ];
-        let columns = columns.map(|(name, of, shape)| Column::new(name, of, &shape, &options.scratch_folder));
-        Ok(Self { zip, columns: columns.into_iter().collect::<Result<_>>()? })
+        let columns = columns.into_iter().filter(|(is_written, ..)| *is_written);
+        let columns = columns.map(|(_, name, of, more, append)| {
+            let head = npy_head(of, &format!("({}{more})", head.voxels));
+            Column::new(name, append, head, &options.scratch_folder)
+        });
+        Ok(Self { zip, columns: columns.collect::<Result<_>>()?, bytes: Vec::new() })
     }
 }
 
 impl VoxelSink for NpzSink {
     fn put(&mut self, voxel: &VoxelRow) -> Result<()> {
-        let [x, y, z] = voxel.center_m.map(f64::to_le_bytes);
-        if let [xyz, log_odds, probability, count] = self.columns.as_mut_slice() {
-            xyz.write([x, y, z].as_flattened())?;
-            log_odds.write(&voxel.log_odds.to_le_bytes())?;
-            probability.write(&(voxel.probability as f32).to_le_bytes())?;
-            count.write(&voxel.observation_count.to_le_bytes())?;
+        for column in &mut self.columns {
+            self.bytes.clear();
+            (column.append)(voxel, &mut self.bytes);
+            column.write(&self.bytes)?;
         }
         Ok(())
     }
@@ -63,11 +88,10 @@ impl VoxelSink for NpzSink {
 }
 
 impl Column {
-    fn new(name: &'static str, of: &str, shape: &str, scratch_folder: &Path) -> Result<Self> {
-        let head = npy_head(of, shape);
+    fn new(name: &'static str, append: AppendValue, head: Vec<u8>, scratch_folder: &Path) -> Result<Self> {
         let mut crc = crc32fast::Hasher::new();
         crc.update(&head);
-        Ok(Self { name, head, crc, spool: Spool::new(scratch_folder)? })
+        Ok(Self { name, append, head, crc, spool: Spool::new(scratch_folder)? })
     }
 
     fn write(&mut self, bytes: &[u8]) -> Result<()> {
@@ -91,7 +115,10 @@ pub(super) fn npy_head(of: &str, shape: &str) -> Vec<u8> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::RowLayers;
+    use super::super::testing::{head_of, row};
     use super::*;
+    use voxtile::Layers;
 
     fn archive(zip64_from: u64) -> Vec<u8> {
         let folder = tempfile::tempdir().unwrap();
@@ -101,7 +128,7 @@ mod tests {
             resolution_m: 0.5,
             bounds_m: [[0.0; 3], [1.0; 3]],
             occupied_log_odds: 0.0,
-            layers: voxtile::Layers::NONE,
+            layers: Layers::NONE,
         };
         let zip = ZipStore::create(&path).unwrap().with_zip64_from(zip64_from);
         let mut sink = Box::new(NpzSink::in_zip(zip, &head, &WriteOptions::for_path(&path)).unwrap());
@@ -113,12 +140,42 @@ mod tests {
                 log_odds: 0.85,
                 observation_count: 3,
                 tile: [0; 3],
-                layers: super::super::RowLayers::default(),
+                layers: RowLayers::default(),
             };
             sink.put(&voxel).unwrap();
         }
         sink.finish().unwrap();
         std::fs::read(path).unwrap()
+    }
+
+    #[test]
+    fn layers_are_arrays() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.npz");
+        let layers = Layers { colour: true, intensity_max: Some(1.0), class: true, time: true, shape: true };
+        let mut rows = [row([0; 3], 0.9), row([1, 0, 0], 0.9)];
+        rows[0].layers = RowLayers {
+            colour: Some([1, 2, 3]),
+            intensity: Some(0.25),
+            stored_intensity: None,
+            class: Some(9),
+            time_ns: Some([-5, 7]),
+        };
+        let head = VoxelsHead { layers, ..head_of(&rows) };
+        let mut sink = Box::new(NpzSink::create(&head, &path, &WriteOptions::for_path(&path)).unwrap());
+        rows.iter().for_each(|row| sink.put(row).unwrap());
+        sink.finish().unwrap();
+        let bytes = std::fs::read(&path).unwrap();
+        let array = |name: &str, length: usize| {
+            let at = bytes.windows(name.len()).position(|part| part == name.as_bytes()).unwrap() + name.len();
+            let head = usize::from(bytes[at + 8]) + 256 * usize::from(bytes[at + 9]) + 10;
+            bytes[at + head..at + head + length].to_vec()
+        };
+        assert_eq!(array("colour.npy", 6), [1, 2, 3, 0, 0, 0]);
+        assert_eq!(array("intensity.npy", 16), [0.25_f64, f64::NAN].map(f64::to_le_bytes).as_flattened());
+        assert_eq!(array("class.npy", 2), [9, 0]);
+        let times = [-5, 7, i64::MIN, i64::MIN].map(i64::to_le_bytes);
+        assert_eq!(array("time_ns.npy", 32), times.as_flattened());
     }
 
     #[test]

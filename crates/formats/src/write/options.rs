@@ -15,6 +15,8 @@ pub struct WriteOptions {
     pub crs: Option<String>,
     /// Unit of the voxels and of the head, for formats that take [`OutputOption::Unit`](super::OutputOption::Unit).
     pub unit: FileUnit,
+    /// Whether voxels have the mean of their points in place of their center.
+    pub has_mean_points: bool,
     /// 2D grids and heightmaps: only voxels that reach above this height, in metres.
     pub z_min_m: Option<f64>,
     /// 2D grids and heightmaps: only voxels that reach below this height, in metres.
@@ -47,6 +49,7 @@ impl WriteOptions {
             scratch_folder: folder,
             crs: None,
             unit: FileUnit::Metre,
+            has_mean_points: false,
             z_min_m: None,
             z_max_m: None,
             cell_m: 20.0,

@@ -41,6 +41,8 @@ pub enum OutputOption {
     Region,
     /// Occupied voxels, free ones, all, or those above a probability.
     Which,
+    /// The mean of the points in a voxel in place of its center.
+    MeanPoints,
     /// Only voxels between two heights.
     Heights,
     /// Edge of the square of a file.

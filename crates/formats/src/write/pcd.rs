@@ -61,9 +61,8 @@ impl VoxelSink for PcdSink<'_> {
             return Err(Error::argument("origin", reason));
         }
         let mut record = [0; 20];
-        let RowLayers { colour, intensity, class, .. } = voxel.layers;
-        let has_intensity = self.layers.intensity_max.is_some();
-        let intensity = if has_intensity { intensity.unwrap_or(f64::NAN) } else { voxel.probability };
+        let RowLayers { colour, class, .. } = voxel.layers;
+        let intensity = voxel.layers.intensity_or_probability(&self.layers, voxel.probability);
         let numbers = [x, y, z, intensity].map(|number| (number as f32).to_le_bytes());
         record[..16].copy_from_slice(numbers.as_flattened());
         record[16..].copy_from_slice(&voxel.observation_count.to_le_bytes());

@@ -47,7 +47,7 @@ impl VoxelSink for PlySink<'_> {
         record[28..36].copy_from_slice(&voxel.log_odds.to_le_bytes());
         record[36..].copy_from_slice(&voxel.observation_count.to_le_bytes());
         self.out.write(&record)?;
-        let RowLayers { colour, intensity, class, time_ns, .. } = voxel.layers;
+        let RowLayers { colour, intensity, class, .. } = voxel.layers;
         if self.layers.colour {
             self.out.write(&colour.unwrap_or_default())?;
         }
@@ -58,8 +58,7 @@ impl VoxelSink for PlySink<'_> {
             self.out.write(&[class.unwrap_or_default()])?;
         }
         if self.layers.time {
-            let seconds = time_ns.map_or([f64::NAN; 2], |times| times.map(|ns| ns as f64 * 1e-9));
-            self.out.write(seconds.map(f64::to_le_bytes).as_flattened())?;
+            self.out.write(voxel.layers.times_s().map(f64::to_le_bytes).as_flattened())?;
         }
         Ok(())
     }

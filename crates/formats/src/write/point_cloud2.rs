@@ -37,6 +37,7 @@ uint32 count
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum FieldType {
     Int32,
+    UInt32,
     Float32,
     Float64,
 }
@@ -45,6 +46,7 @@ impl FieldType {
     fn number(self) -> u8 {
         match self {
             Self::Int32 => 5,
+            Self::UInt32 => 6,
             Self::Float32 => 7,
             Self::Float64 => 8,
         }
@@ -52,7 +54,7 @@ impl FieldType {
 
     pub(super) fn bytes(self) -> u32 {
         match self {
-            Self::Int32 | Self::Float32 => 4,
+            Self::Int32 | Self::UInt32 | Self::Float32 => 4,
             Self::Float64 => 8,
         }
     }

@@ -1,4 +1,4 @@
-use super::output_format::OutputOption::{Cell, Crs, Heights, Quantized, Region, Unit, Which};
+use super::output_format::OutputOption::{Cell, Crs, Heights, MeanPoints, Quantized, Region, Unit, Which};
 use super::*;
 use std::path::Path;
 use voxtile::octree::OctreeFormat;
@@ -57,41 +57,49 @@ const fn row(
     }
 }
 
+/// Options of formats of points.
+const POINTS: &[OutputOption] = &[Region, Which, MeanPoints];
+const POINTS_CRS: &[OutputOption] = &[Region, Which, MeanPoints, Crs];
+const POINTS_CRS_UNIT: &[OutputOption] = &[Region, Which, MeanPoints, Crs, Unit];
+
 const TREE_REFUSAL: &str = "an octree file always contains free and occupied voxels; omit the option";
 
 /// All output formats. Help texts, hints and option checks are generated from this table, and documents are checked
 /// against it.
 #[rustfmt::skip]
 const TABLE: [OutputFormat; 19] = [
-    OutputFormat { origin: Origin::Corner,
+    OutputFormat { origin: Origin::Corner, takes: POINTS,
         ..row("ply", Some("ply"), "Points with doubles, probability, log-odds and count",
               stream!(ply::PlySink::new)) },
-    OutputFormat { origin: Origin::CornerNearby,
+    OutputFormat { origin: Origin::CornerNearby, takes: POINTS,
         ..row("pcd", Some("pcd"), "Points with float32, as PCL reads them", stream!(pcd::PcdSink::new)) },
-    OutputFormat { origin: Origin::Corner, is_text: true,
+    OutputFormat { origin: Origin::Corner, takes: POINTS, is_text: true,
         ..row("csv", Some("csv"), "Text", stream!(csv::CsvSink::new)) },
     OutputFormat { origin: Origin::Corner, takes: &[Region], refusal: TREE_REFUSAL,
         ..row("bt", Some("bt"), "OctoMap's free and occupied voxels", Writer::Octree(OctreeFormat::Bt)) },
     OutputFormat { origin: Origin::Corner, takes: &[Region], refusal: TREE_REFUSAL,
         ..row("ot", Some("ot"), "OctoMap's log-odds", Writer::Octree(OctreeFormat::Ot)) },
-    OutputFormat { is_text: true, takes: &[Region, Which, Unit],
+    OutputFormat { is_text: true, takes: &[Region, Which, MeanPoints, Unit],
         ..row("xyz", Some("xyz"), "Text: x y z probability", files!(xyz::XyzSink::create)) },
-    row("npz", Some("npz"), "NumPy arrays: xyz, log_odds, probability, count", files!(npz::NpzSink::create)),
-    OutputFormat { takes: &[Region, Which, Crs, Unit],
+    OutputFormat { takes: POINTS,
+        ..row("npz", Some("npz"), "NumPy arrays: xyz, log_odds, probability, count",
+              files!(npz::NpzSink::create)) },
+    OutputFormat { takes: POINTS_CRS_UNIT,
         ..with_feature!("las", "las", "las", "LAS 1.4 with log-odds and count as extra bytes",
                         files!(las::LasSink::plain)) },
-    OutputFormat { takes: &[Region, Which, Crs, Unit],
+    OutputFormat { takes: POINTS_CRS_UNIT,
         ..with_feature!("las", "laz", "laz", "The same, compressed", files!(las::LasSink::compressed)) },
-    OutputFormat { takes: &[Region, Which, Crs, Unit],
+    OutputFormat { takes: POINTS_CRS_UNIT,
         ..with_feature!("las", "copc", "copc.laz", "The same with levels of detail",
                         files!(copc::CopcSink::create)) },
-    OutputFormat { takes: &[Region, Which, Crs],
+    OutputFormat { takes: POINTS_CRS,
         ..with_feature!("e57", "e57", "e57", "ASTM E57", files!(e57::E57Sink::create)) },
-    OutputFormat { takes: &[Region, Which, Crs],
+    OutputFormat { takes: POINTS_CRS,
         ..with_feature!("parquet", "parquet", "parquet", "Apache Parquet, if enabled in this build",
                         files!(parquet::ParquetSink::create)) },
-    with_feature!("ros", "mcap", "mcap", "A recording with PointCloud2 messages, for Foxglove and others",
-            files!(mcap::McapSink::create)),
+    OutputFormat { takes: POINTS,
+        ..with_feature!("ros", "mcap", "mcap", "A recording with PointCloud2 messages, for Foxglove and others",
+                        files!(mcap::McapSink::create)) },
     OutputFormat::GLB,
     OutputFormat { takes: &[Region, Which, Heights], needs_free_voxels: true,
         ..row("nav2", Some("pgm"), "A 2D occupancy grid for nav2: .pgm and .yaml", files!(nav2::Nav2Sink::create)) },
@@ -101,7 +109,7 @@ const TABLE: [OutputFormat; 19] = [
     OutputFormat { takes: &[Region, Which, Heights, Crs, Unit],
         ..row("geotiff", Some("tif"), "Heights as a GeoTIFF: highest, lowest and mean of each column of voxels",
               files!(geotiff::GeoTiffSink::create)) },
-    OutputFormat { takes: &[Region, Which, Cell], origin: Origin::Point,
+    OutputFormat { takes: &[Region, Which, MeanPoints, Cell], origin: Origin::Point,
         ..row("autoware", None, "A folder with a PCD file per grid square, and Autoware's metadata",
               files!(autoware::AutowareSink::create)) },
     OutputFormat { takes: &[],

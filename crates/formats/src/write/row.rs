@@ -6,7 +6,8 @@ use voxtile::{Layers, VoxelLayers};
 pub struct VoxelRow {
     /// Index in the map along x, y and z.
     pub index: [i32; 3],
-    /// Center in the coordinates of the file, in metres: the map's coordinates minus the file's origin.
+    /// Center in the coordinates of the file, in metres: the map's coordinates minus the file's origin. The mean of the
+    /// voxel's points in a file of mean points.
     pub center_m: [f64; 3],
     /// Probability of being occupied.
     pub probability: f64,
@@ -36,6 +37,10 @@ pub struct RowLayers {
 }
 
 impl RowLayers {
+    /// No value.
+    pub const NONE: Self =
+        Self { colour: None, intensity: None, stored_intensity: None, class: None, time_ns: None };
+
     /// Converts the layers of a voxel.
     pub fn of(made: &VoxelLayers, layers: &Layers) -> Self {
         let intensity = made.mean_intensity(layers);
@@ -47,6 +52,17 @@ impl RowLayers {
             class: made.class(),
             time_ns: made.time.map(|time| [time.first_ns, time.last_ns]),
         }
+    }
+
+    /// Value of a field that files call intensity: the mean intensity, NaN without one, or in a map without this layer
+    /// the probability.
+    pub(super) fn intensity_or_probability(&self, layers: &Layers, probability: f64) -> f64 {
+        if layers.intensity_max.is_some() { self.intensity.unwrap_or(f64::NAN) } else { probability }
+    }
+
+    /// Time stamps in seconds; NaN without any.
+    pub(super) fn times_s(&self) -> [f64; 2] {
+        self.time_ns.map_or([f64::NAN; 2], |times| times.map(|ns| ns as f64 * 1e-9))
     }
 }
 

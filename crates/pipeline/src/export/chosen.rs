@@ -5,19 +5,12 @@ use voxtile::mapper::{MapReader, MapView, Stoppable};
 use voxtile::maths::least_logit;
 use voxtile::scan::Stop;
 use voxtile::sensor::Probabilities;
-use voxtile::space::{Aabb, Point, TileIndex, VoxelIndex};
-use voxtile::tile::Voxel;
-use voxtile::{MapQueries, Result};
+use voxtile::space::{Aabb, Grid, Point, TileIndex, VoxelBox, VoxelIndex};
+use voxtile::tile::{Voxel, VoxelLayers};
+use voxtile::{Error, Layers, MapQueries, Result};
 use voxtile_formats::write::{RowLayers, VoxelRow};
 
-/// Whether voxels are passed with their layers.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum WithLayers {
-    Yes,
-    No,
-}
-
-/// Selection of voxels.
+/// Selection of voxels, and of their content.
 pub(super) struct Chosen {
     pub region: Option<Aabb>,
     /// Minimum probability. `None`: the map's threshold.
@@ -26,11 +19,28 @@ pub(super) struct Chosen {
     pub min_log_odds: f64,
     /// Upper limit of log-odds, exclusive unless infinite.
     end_log_odds: f64,
+    /// Layers to write.
+    pub layers: Layers,
+    /// Whether the points of voxels are written in place of their centers.
+    pub mean_points: bool,
 }
+
+/// Offset of a point from the center of its voxel, as a share of the voxel's edge.
+pub(super) type Offset = [f64; 3];
 
 impl Chosen {
     /// Creates the selection for a map with this threshold in log-odds.
-    pub fn of(export: &Export<'_>, threshold: f64) -> Self {
+    ///
+    /// # Errors
+    ///
+    /// Mean points are requested, and the map does not have the layer.
+    pub fn of(export: &Export<'_>, threshold: f64, layers: Layers) -> Result<Self> {
+        let mean_points = export.options.mean_points;
+        if mean_points && !layers.shape {
+            let reason = "the map has no layer shape: build it with `layers` shape; a map that keeps its scans gets \
+                          layers by `voxtile remap MAP -o NEW --layers shape`";
+            return Err(Error::argument("mean_points", reason));
+        }
         let default = if export.format.needs_free_voxels { WhichVoxels::All } else { WhichVoxels::Occupied };
         let (min_probability, min_log_odds, end_log_odds) = match export.options.which.unwrap_or(default) {
             WhichVoxels::Occupied => (None, threshold, f64::INFINITY),
@@ -40,7 +50,9 @@ impl Chosen {
             }
             WhichVoxels::All | WhichVoxels::AtLeast(_) => (Some(0.0), f64::NEG_INFINITY, f64::INFINITY),
         };
-        Self { region: export.options.region, min_probability, min_log_odds, end_log_odds }
+        let layers = if export.options.with_layers { layers } else { Layers::NONE };
+        let region = export.options.region;
+        Ok(Self { region, min_probability, min_log_odds, end_log_odds, layers, mean_points })
     }
 
     /// Returns whether log-odds are below the upper limit.
@@ -61,65 +73,86 @@ impl Chosen {
             }
         }
         let mut count = 0;
-        self.visit(&Stoppable::new(map, stop), |voxel| {
-            count += u64::from(self.is_below_end(voxel.evidence.log_odds));
-        })?;
+        self.visit(&Stoppable::new(map, stop), |_| count += 1)?;
         Ok(count)
     }
 
-    fn visit(&self, map: &impl MapView, visit: impl FnMut(Voxel)) -> Result<()> {
-        map.for_each_occupied(self.min_probability, self.region.as_ref(), visit)
+    /// Visits the voxels tile by tile, without their layers.
+    pub fn visit(&self, map: &impl MapView, mut visit: impl FnMut(Voxel)) -> Result<()> {
+        map.for_each_occupied(self.min_probability, self.region.as_ref(), |voxel| {
+            if self.is_below_end(voxel.evidence.log_odds) {
+                visit(voxel);
+            }
+        })
     }
 
-    /// Visits the voxels tile by tile until an error, with their centers in the file's coordinates.
+    /// Visits the voxels tile by tile until an error. `point_m` returns the point of a voxel in the file's coordinates.
     pub fn for_each(
         &self,
         map: &impl MapView,
         gauge: &dyn Gauge,
-        with_layers: WithLayers,
-        center_m: impl Fn(VoxelIndex) -> Point,
-        mut visit: impl FnMut(&VoxelRow) -> Result<()>,
+        point_m: impl Fn(VoxelIndex, Offset) -> Point,
+        mut put: impl FnMut(&VoxelRow) -> Result<()>,
     ) -> Result<()> {
         let grid = map.config().grid;
-        let layers = map.config().layers();
-        let has_layers = with_layers == WithLayers::Yes && !layers.is_none();
-        let mut of_tile = None;
-        let mut tiles = Tiles { all: map.tile_indices(), done: 0, now: None, gauge };
+        let of_map = map.config().layers();
+        let mut tiles = Tiles { all: map.tile_indices(), done: 0, gauge };
         let mut probabilities = Probabilities::default();
-        let (failed, mut outcome) = (Stop::default(), Ok(()));
-        let visited = self.visit(&Stoppable::new(map, &failed), |Voxel { index, evidence, .. }| {
-            if outcome.is_err() || !self.is_below_end(evidence.log_odds) {
-                return;
-            }
-            let tile = grid.tile_of_voxel(index);
-            if tiles.reach(tile) && has_layers {
-                of_tile = match map.tile_uncached(tile) {
-                    Ok(found) => found,
-                    Err(error) => {
-                        outcome = Err(error);
-                        failed.set();
-                        return;
-                    }
-                };
-            }
-            let of_voxel = of_tile.as_ref().and_then(|tile| tile.layers_of(index));
-            outcome = visit(&VoxelRow {
+        let mut row_of = |Voxel { index, evidence, .. }, tile: TileIndex, made: Option<VoxelLayers>| {
+            let offset =
+                made.as_ref().filter(|_| self.mean_points).and_then(|made| made.mean_offset(&of_map));
+            VoxelRow {
                 index,
-                center_m: center_m(index),
+                center_m: point_m(index, offset.unwrap_or_default()),
                 probability: probabilities.of(evidence.log_odds),
                 log_odds: evidence.log_odds,
                 observation_count: evidence.observation_count,
                 tile: tile.to_array(),
-                layers: of_voxel.map_or(RowLayers::default(), |made| RowLayers::of(&made, &layers)),
-            });
-            if outcome.is_err() {
-                failed.set();
+                layers: made.map_or(RowLayers::NONE, |made| RowLayers::of(&made, &self.layers)),
             }
-        });
-        outcome?;
-        visited?;
+        };
+        if self.layers.is_none() && !self.mean_points {
+            let (failed, mut outcome) = (Stop::default(), Ok(()));
+            let visited = self.visit(&Stoppable::new(map, &failed), |voxel| {
+                let tile = grid.tile_of_voxel(voxel.index);
+                tiles.reach(tile);
+                if outcome.is_ok() {
+                    outcome = put(&row_of(voxel, tile, None));
+                }
+                if outcome.is_err() {
+                    failed.set();
+                }
+            });
+            outcome?;
+            visited?;
+        } else {
+            // Reads each tile once, with its layers.
+            for index in tiles.all.clone() {
+                tiles.reach(index);
+                if !self.may_have_voxels(&grid.voxels_of_tile(index), &grid) {
+                    continue;
+                }
+                let Some(tile) = map.tile_uncached(index)? else { continue };
+                for voxel in tile.voxels_from(self.min_log_odds) {
+                    if self.is_chosen(&voxel, &grid) {
+                        put(&row_of(voxel, index, tile.layers_of(voxel.index)))?;
+                    }
+                }
+            }
+        }
         tiles.pass(tiles.all.len());
         Ok(())
+    }
+
+    /// Returns whether a box of voxels may have some in the region.
+    fn may_have_voxels(&self, voxels: &VoxelBox, grid: &Grid) -> bool {
+        self.region.is_none_or(|region| !grid.voxels_in(&region).intersection(voxels).is_empty())
+    }
+
+    /// Returns whether a voxel with at least the minimum log-odds is selected.
+    fn is_chosen(&self, voxel: &Voxel, grid: &Grid) -> bool {
+        self.is_below_end(voxel.evidence.log_odds)
+            && self.region.is_none_or(|region| region.contains(grid.center_m(voxel.index)))
     }
 }
 
@@ -127,18 +160,15 @@ impl Chosen {
 struct Tiles<'a> {
     all: Vec<TileIndex>,
     done: usize,
-    now: Option<TileIndex>,
     gauge: &'a dyn Gauge,
 }
 
 impl Tiles<'_> {
-    /// Notes the tile of the current voxel; returns whether it is another one than before.
-    fn reach(&mut self, tile: TileIndex) -> bool {
-        let is_next = self.now.replace(tile) != Some(tile);
-        if is_next {
+    /// Notes the tile of the current voxel.
+    fn reach(&mut self, tile: TileIndex) {
+        if self.all.get(self.done).is_none_or(|next| *next <= tile) {
             self.pass(self.all.partition_point(|other| *other <= tile));
         }
-        is_next
     }
 
     fn pass(&mut self, count: usize) {

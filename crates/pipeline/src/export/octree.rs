@@ -17,6 +17,11 @@ pub(super) fn export(export: &Export<'_>, format: OctreeFormat) -> anyhow::Resul
     }
     read_map(&options.map, |reader| {
         let grid = reader.config().grid;
+        let has_colours = options.with_layers && reader.config().layers().colour;
+        let format = match format {
+            OctreeFormat::Ot if has_colours => OctreeFormat::ColorOt,
+            other => other,
+        };
         let origin = options.origin_m.map(|requested_m| ExportOrigin::near(requested_m, &grid));
         let origin = origin.transpose()?.unwrap_or_default();
         let (region, memory_bytes) = (options.region.as_ref(), options.memory_bytes);
@@ -46,7 +51,7 @@ fn of_octree(
     file.write(&origin, &octree_file::grid_of(&octree)?, |mut out| {
         match format {
             OctreeFormat::Bt => write_bt(tree, resolution_m, 0.0, &mut out)?,
-            OctreeFormat::Ot => write_ot(tree, resolution_m, &mut out)?,
+            OctreeFormat::Ot | OctreeFormat::ColorOt => write_ot(tree, resolution_m, &mut out)?,
         }
         Ok(())
     })?;

@@ -17,6 +17,12 @@ pub struct ExportOptions {
     pub formats: OutputFormats,
     /// Voxels to write. Default: occupied voxels, or all for formats that distinguish free from unobserved voxels.
     pub which: Option<WhichVoxels>,
+    /// Whether the map's layers (colours, intensities, classes, times) are written by formats that can store them: a
+    /// `.ot` file of a map with colours is a `ColorOcTree`.
+    pub with_layers: bool,
+    /// Writes the mean of the points that hit a voxel in place of its center. The map needs the layer shape. Voxels
+    /// without a hit remain at their center.
+    pub mean_points: bool,
     /// 2D grids: minimum height in metres.
     pub z_min_m: Option<f64>,
     /// 2D grids: maximum height in metres.
@@ -61,6 +67,8 @@ impl ExportOptions {
             format: None,
             formats: OutputFormats::default(),
             which: None,
+            with_layers: true,
+            mean_points: false,
             z_min_m: None,
             z_max_m: None,
             cell_m: None,
@@ -170,6 +178,7 @@ impl ExportOptions {
         let given = [
             (OutputOption::Region, self.region.is_some(), "region"),
             (OutputOption::Which, self.which.is_some(), which),
+            (OutputOption::MeanPoints, self.mean_points, "mean_points"),
             (OutputOption::Heights, has_heights, "z_min, z_max"),
             (OutputOption::Cell, self.cell_m.is_some(), "cell"),
             (OutputOption::Quantized, self.is_quantized, "quantize"),

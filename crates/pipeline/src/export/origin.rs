@@ -1,3 +1,4 @@
+use super::chosen::Offset;
 use voxtile::space::{Grid, Point, VoxelBox, VoxelIndex};
 use voxtile::{Error, Result};
 use voxtile_formats::write::PCD_REACH_VOXELS;
@@ -79,11 +80,11 @@ impl ExportOrigin {
         self.voxel != [0; 3]
     }
 
-    /// Returns the center of a voxel in the file's coordinates: `(index - origin + 0.5) * resolution`.
-    pub fn center_m(&self, voxel: VoxelIndex, grid: &Grid) -> Point {
+    /// Returns a point of a voxel in the file's coordinates: `(index - origin + 0.5 + offset) * resolution`.
+    pub fn point_m(&self, voxel: VoxelIndex, offset: Offset, grid: &Grid) -> Point {
         std::array::from_fn(|k| {
             // Differences of indices are exact in f64.
-            (f64::from(voxel[k]) - f64::from(self.voxel[k]) + 0.5) * grid.resolution_m()
+            (f64::from(voxel[k]) - f64::from(self.voxel[k]) + 0.5 + offset[k]) * grid.resolution_m()
         })
     }
 }

@@ -1,4 +1,4 @@
-use super::chosen::{Chosen, WithLayers};
+use super::chosen::{Chosen, Offset};
 use super::moved_file::MovedFile;
 use super::origin::ExportOrigin;
 use super::run::Export;
@@ -22,19 +22,17 @@ pub(super) fn export(export: &Export<'_>) -> anyhow::Result<ExportSummary> {
 
 fn of_map(export: &Export<'_>, file: &MovedFile<'_>, reader: &MapReader) -> anyhow::Result<ExportSummary> {
     let (grid, stop) = (reader.config().grid, export.watch.stop());
-    let chosen = Chosen::of(export, reader.config().occupied_log_odds());
+    let chosen = Chosen::of(export, reader.config().occupied_log_odds(), reader.config().layers())?;
     let tiles = reader.tile_indices();
     let origin = origin_of(export, &grid, || hull(&grid, &tiles, chosen.region.as_ref()))?;
     let voxels = chosen.count(reader, stop)?;
     file.write(&origin, &grid, |out| {
         let gauge = export.watch.over_tiles(tiles.len());
-        let layers = reader.config().layers();
-        let mut sink = open(export, voxels, layers, &grid, &origin, out)?;
+        let mut sink = open(export, voxels, chosen.layers, &grid, &origin, out)?;
         chosen.for_each(
             &Stoppable::new(reader, stop),
             &*gauge,
-            WithLayers::Yes,
-            |voxel| origin.center_m(voxel, &grid),
+            |voxel, offset| origin.point_m(voxel, offset, &grid),
             |row| sink.put(row),
         )?;
         Ok(sink.finish()?)
@@ -49,7 +47,7 @@ fn of_octree(
     octree: &OctreeFile,
 ) -> anyhow::Result<ExportSummary> {
     let grid = octree_file::grid_of(octree)?;
-    let chosen = Chosen::of(export, 0.0);
+    let chosen = Chosen::of(export, 0.0, Layers::NONE)?;
     let origin = origin_of(export, &grid, || None)?;
     let min_log_odds = chosen.min_log_odds as f32;
     let is_chosen = |voxel: &VoxelRow| {
@@ -61,7 +59,7 @@ fn of_octree(
         let mut sink = open(export, voxels, Layers::NONE, &grid, &origin, out)?;
         octree_file::for_each_voxel(octree, min_log_odds, |voxel| {
             if is_chosen(voxel) {
-                let center_m = origin.center_m(voxel.index, &grid);
+                let center_m = origin.point_m(voxel.index, Offset::default(), &grid);
                 sink.put(&VoxelRow { center_m, ..*voxel })?;
             }
             Ok(())
