@@ -1,149 +1,36 @@
 //! Layers: compared with naive sums for all mappers, storages, memory limits and operations.
 
+use crate::harness::all_layers;
 use rayon::ThreadPoolBuilder;
-use std::collections::BTreeMap;
-use testkit::random_scans::{Random, random_scan};
-use testkit::reference_map::voxels_of;
+use testkit::attributed_scan::AttributedScan;
+use testkit::random_scans::Random;
+use testkit::reference_layers::{LayerSums, layers_of};
+use testkit::reference_map::{ReferenceMap, voxels_of};
 use testkit::unsynced_disk::UnsyncedDisk;
 use voxtile::integrity::{repair, verify};
 use voxtile::operations::{
     Decay, Part, Prefer, Replay, ScanSelection, clear, convert, crop, decay, merge, rebuild, remove_points,
     remove_scans,
 };
-use voxtile::scan::{OFFSETS_PER_VOXEL, ScanRef};
 use voxtile::sensor::{Iwlo, SensorModel};
-use voxtile::tile::{ClassVotes, TimeSpan};
 use voxtile::{
     Aabb, Error, InMemoryMapper, InsertMode, Layers, MapConfig, MapPath, MapQueries, MapReader, MapView,
-    Mapper, OutOfCoreTileMapper, PointAttributes, Scan, ScanPoints, Stop, Storage, TileBox, VoxelIndex,
-    VoxelLayers,
+    Mapper, OutOfCoreTileMapper, ScanPoints, Stop, Storage, TileBox, VoxelIndex,
 };
 
-/// Scan with attributes and, mostly, a time stamp.
-struct Attributed {
-    scan: Scan,
-    attributes: PointAttributes,
-    stamp_ns: Option<i64>,
-}
-
-impl Attributed {
-    fn random(random: &mut Random, points: usize) -> Self {
-        let scan = random_scan(random, [0.5; 3], points);
-        let mut attributes = PointAttributes::default();
-        let (has_colours, has_classes) = (random.below(4) > 0, random.below(4) > 0);
-        for _ in &scan.points {
-            if has_colours {
-                let colour = [0; 3].map(|_| random.below(256) as u8);
-                attributes.colours.push((random.below(8) > 0).then_some(colour));
-            }
-            if has_classes {
-                let class = [2, 2, 2, 6, 0, 255][random.below(6) as usize];
-                attributes.classes.push((random.below(8) > 0).then_some(class));
-            }
-        }
-        let stamp_ns = [None, Some(i64::MIN), Some(i64::MAX), Some(random.next() as i64 >> 8)];
-        Self { scan, attributes, stamp_ns: stamp_ns[random.below(4) as usize] }
-    }
-
-    fn points(&self) -> ScanRef<'_> {
-        let points = ScanRef::in_world(self.scan.origin, &self.scan.points);
-        let points = points.with_intensities(self.scan.intensities.as_ref().unwrap()).unwrap();
-        let points = points.with_attributes(&self.attributes).unwrap();
-        self.stamp_ns.map_or(points, |stamp_ns| points.with_stamp_ns(stamp_ns))
-    }
-}
-
-fn scans(seed: u64, count: usize, points: usize) -> Vec<Attributed> {
+fn scans(seed: u64, count: usize, points: usize) -> Vec<AttributedScan> {
     let mut random = Random(seed);
-    (0..count).map(|_| Attributed::random(&mut random, points)).collect()
+    (0..count).map(|_| AttributedScan::random(&mut random, [0.5; 3], points)).collect()
 }
-
-type Naive = BTreeMap<VoxelIndex, VoxelLayers>;
 
 /// Sums over the points that hit a voxel.
-fn naive(config: &MapConfig, scans: &[Attributed]) -> Naive {
-    let mut all = Naive::new();
-    scans.iter().for_each(|scan| add(&mut all, config, scan));
-    all
-}
-
-fn add(all: &mut Naive, config: &MapConfig, Attributed { scan, attributes, stamp_ns }: &Attributed) {
-    let layers = config.layers();
-    for (number, &point) in scan.points.iter().enumerate() {
-        let intensity = scan.intensities.as_ref().unwrap()[number];
-        let is_measured = match config.sensor_model {
-            SensorModel::Iwlo(_) => {
-                !intensity.is_nan()
-                    && config.sensor_model.is_evidence(voxtile::sensor::Observation::Hit(intensity))
-            }
-            _ => true,
-        };
-        let length = (0..3).map(|k| (point[k] - scan.origin[k]).powi(2)).sum::<f64>().sqrt();
-        let is_in_range = config.rays.max_range_m.is_none_or(|max| length <= max);
-        let Some(voxel) = config.grid.voxel_of(point) else { continue };
-        let is_ray = point.iter().all(|x| x.is_finite()) && point != scan.origin && length < 1e6;
-        let is_mapped =
-            config.rays.region.is_none_or(|region| region.contains(config.grid.tile_of_voxel(voxel)));
-        if !(is_measured && is_in_range && is_ray && is_mapped) {
-            continue;
-        }
-        let of_voxel = all.entry(voxel).or_default();
-        of_voxel.points += 1;
-        if let (true, Some(Some([red, green, blue]))) = (layers.colour, attributes.colours.get(number)) {
-            of_voxel.colour.points += 1;
-            of_voxel.colour.red += u64::from(*red);
-            of_voxel.colour.green += u64::from(*green);
-            of_voxel.colour.blue += u64::from(*blue);
-        }
-        if let (Some(max), false) = (layers.intensity_max, intensity.is_nan()) {
-            let stored = (f64::from(intensity) / f64::from(max) * 65535.0).round().clamp(0.0, 65535.0) as u64;
-            of_voxel.intensity.points += 1;
-            of_voxel.intensity.sum += stored;
-            of_voxel.intensity.squares += stored * stored;
-        }
-        if let (true, Some(&Some(class))) = (layers.class, attributes.classes.get(number)) {
-            match of_voxel.classes.iter_mut().find(|votes| votes.class == class) {
-                Some(votes) => votes.votes += 1,
-                None => of_voxel.classes.push(ClassVotes { class, votes: 1 }),
-            }
-            of_voxel.classes.sort_by_key(|votes| votes.class);
-        }
-        if let (true, Some(now)) = (layers.time, *stamp_ns) {
-            let span = of_voxel.time.unwrap_or(TimeSpan { first_ns: now, last_ns: now });
-            let (first_ns, last_ns) = (span.first_ns.min(now), span.last_ns.max(now));
-            of_voxel.time = Some(TimeSpan { first_ns, last_ns });
-        }
-        if layers.shape {
-            let units = config.grid.to_voxel_units(point);
-            let edge = f64::from(OFFSETS_PER_VOXEL);
-            let offset: [i64; 3] =
-                std::array::from_fn(|k| ((units[k] - f64::from(voxel[k])) * edge).floor() as i64 - 512);
-            (0..3).for_each(|k| of_voxel.shape.offsets[k] += offset[k]);
-            for (k, (a, b)) in [(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)].into_iter().enumerate() {
-                of_voxel.shape.products[k] += offset[a] * offset[b];
-            }
-        }
+fn naive(config: &MapConfig, scans: &[AttributedScan]) -> LayerSums {
+    let mut map = ReferenceMap::new(config);
+    scans.iter().for_each(|scan| map.insert_attributed(scan));
+    if let Some(region) = config.rays.region {
+        map.layers.retain(|voxel, _| region.contains(config.grid.tile_of_voxel(*voxel)));
     }
-}
-
-fn layers_of(view: &impl MapView) -> Naive {
-    let mut all = Naive::new();
-    for tile in view.tiles() {
-        let tile = tile.unwrap();
-        if let Some(layers) = tile.table().layers() {
-            layers.for_each(|code, made| {
-                let voxel = tile.index_of(code);
-                assert!(tile.evidence(voxel).is_some(), "{voxel:?} was not observed");
-                assert_eq!(tile.layers_of(voxel).as_ref(), Some(&made));
-                all.insert(voxel, made);
-            });
-        }
-    }
-    all
-}
-
-fn all_layers() -> Layers {
-    Layers { colour: true, intensity_max: Some(255.0), class: true, time: true, shape: true }
+    map.layers
 }
 
 fn config() -> MapConfig {
@@ -178,7 +65,7 @@ fn at(folder: &tempfile::TempDir, name: &str) -> MapPath {
     MapPath::on(UnsyncedDisk::shared(), folder.path().join(name))
 }
 
-fn build(path: MapPath, config: &MapConfig, scans: &[Attributed]) -> OutOfCoreTileMapper {
+fn build(path: MapPath, config: &MapConfig, scans: &[AttributedScan]) -> OutOfCoreTileMapper {
     let mut mapper = OutOfCoreTileMapper::create(path, config.clone()).unwrap();
     for scan in scans {
         mapper.insert_points(&scan.points()).unwrap();
@@ -191,10 +78,7 @@ fn build(path: MapPath, config: &MapConfig, scans: &[Attributed]) -> OutOfCoreTi
 fn layers_equal_naive_sums_for_all_mappers() {
     for (seed, config) in (0..).zip(configs()) {
         let scans = scans(seed, 5, 120);
-        let mut expected = naive(&config, &scans);
-        if config.layers().is_none() {
-            expected.clear();
-        }
+        let expected = naive(&config, &scans);
         let mut in_memory = InMemoryMapper::new(config.clone()).unwrap();
         for scan in &scans {
             in_memory.insert_points(&scan.points()).unwrap();
@@ -237,7 +121,7 @@ fn layers_do_not_depend_on_threads_order_or_batches() {
         }
         mapper.layer_digest().unwrap()
     };
-    let all: Vec<_> = scans.iter().map(Attributed::points).collect();
+    let all: Vec<_> = scans.iter().map(AttributedScan::points).collect();
     let all: Vec<&dyn ScanPoints> = all.iter().map(|scan| scan as _).collect();
     for (threads, bytes) in [(1, None), (3, None), (8, Some(40 << 20)), (2, Some(60_000))] {
         let folder = tempfile::tempdir().unwrap();
@@ -267,8 +151,9 @@ fn hits_without_rays_are_counted_once_each() {
         mapper.flush().unwrap();
         let points: u64 = layers_of(&mapper).values().map(|layers| layers.points).sum();
         // All finite points in range hit, also those at the origin.
-        let hits =
-            |scan: &Attributed| scan.scan.points.iter().filter(|point| config_voxel(**point)).count() as u64;
+        let hits = |scan: &AttributedScan| {
+            scan.scan.points.iter().filter(|point| config_voxel(**point)).count() as u64
+        };
         assert_eq!(points, scans.iter().map(hits).sum::<u64>());
         digests.push(mapper.layer_digest().unwrap());
     }
@@ -311,10 +196,10 @@ fn operations_keep_add_and_drop_layers() {
         (0..3).all(|k| region.min[k] <= center[k] && center[k] < region.max[k])
     };
     crop(&open("a"), &Part::Inside(region), path("cropped"), |_, _| {}).unwrap();
-    let expected: Naive = a.clone().into_iter().filter(|(voxel, _)| is_in(voxel)).collect();
+    let expected: LayerSums = a.clone().into_iter().filter(|(voxel, _)| is_in(voxel)).collect();
     assert!(layers_of(&open("cropped")) == expected);
     clear(at(&folder, "b"), &Part::Inside(region), |_, _| {}).unwrap();
-    let expected: Naive = b.into_iter().filter(|(voxel, _)| !is_in(voxel)).collect();
+    let expected: LayerSums = b.into_iter().filter(|(voxel, _)| !is_in(voxel)).collect();
     assert!(layers_of(&open("b")) == expected);
 
     let compact = convert(&open("a"), path("compact"), Storage::Compact, |_, _| {});
@@ -323,7 +208,7 @@ fn operations_keep_add_and_drop_layers() {
     let fading = Decay::new(2.0).with_scans(3).with_forget_below(0.3);
     decay(at(&folder, "a"), &fading, |_, _| {}).unwrap();
     let left = voxels_of(&open("a"));
-    let expected: Naive = a.into_iter().filter(|(voxel, _)| left.contains_key(voxel)).collect();
+    let expected: LayerSums = a.into_iter().filter(|(voxel, _)| left.contains_key(voxel)).collect();
     assert!(layers_of(&open("a")) == expected);
 }
 
@@ -358,13 +243,7 @@ fn layers_follow_kept_scans() {
     let folder = tempfile::tempdir().unwrap();
     let config = config().with_kept_scans(true);
     let mut scans = scans(21, 6, 150);
-    scans.iter_mut().for_each(|scan| scan.scan.points.retain(|point| point.iter().all(|x| x.abs() < 1e3)));
-    for scan in &mut scans {
-        let points = scan.scan.points.len();
-        scan.scan.intensities.as_mut().unwrap().truncate(points);
-        scan.attributes.colours.truncate(points);
-        scan.attributes.classes.truncate(points);
-    }
+    scans.iter_mut().for_each(|scan| scan.retain(|point| point.iter().all(|x| x.abs() < 1e3)));
     drop(build(at(&folder, "map"), &config, &scans));
     let open = |name: &str| MapReader::open(at(&folder, name), 0).unwrap();
 
@@ -383,22 +262,8 @@ fn layers_follow_kept_scans() {
 
     let region = Aabb { min: [0.0, -1.0, -5.0], max: [2.0, 3.0, 5.0] };
     remove_points(at(&folder, "map"), &region, &how, |_, _| ()).unwrap();
-    for Attributed { scan, attributes, .. } in &mut scans {
-        let keeps: Vec<bool> = scan
-            .points
-            .iter()
-            .map(|point| !(0..3).all(|k| region.min[k] <= point[k] && point[k] < region.max[k]))
-            .collect();
-        let kept = |number: &mut usize| {
-            *number += 1;
-            keeps[*number - 1]
-        };
-        let mut numbers = [0; 4];
-        scan.points.retain(|_| kept(&mut numbers[0]));
-        scan.intensities.as_mut().unwrap().retain(|_| kept(&mut numbers[1]));
-        attributes.colours.retain(|_| kept(&mut numbers[2]));
-        attributes.classes.retain(|_| kept(&mut numbers[3]));
-    }
+    let is_outside = |point: [f64; 3]| !(0..3).all(|k| region.min[k] <= point[k] && point[k] < region.max[k]);
+    scans.iter_mut().for_each(|scan| scan.retain(is_outside));
     assert!(layers_of(&open("map")) == naive(&config, &scans));
     let mut findings = Vec::new();
     verify(at(&folder, "map"), |finding| findings.push(finding.clone()), |_, _| {}).unwrap();

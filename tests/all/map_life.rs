@@ -2,8 +2,8 @@
 //! fault or a crash at every operation.
 
 use crate::harness::{
-    Act, EVERY_CRASH, Left, Life, Subject, at, check_files, config, faults, keeping_scans, map, perform,
-    sweep, sweep_after_kills,
+    Act, EVERY_CRASH, Left, Life, Subject, all_layers, at, check_files, config, faults, keeping_scans, map,
+    perform, sweep, sweep_after_kills,
 };
 use testkit::faulty_disk::{Fault, FaultyDisk};
 use testkit::random_scans::Random;
@@ -13,13 +13,14 @@ use voxtile::sensor::{Iwlo, SensorModel};
 use voxtile::store::TileStore;
 use voxtile::{Aabb, Clearing, Guard, InsertMode, MapQueries, MapReader};
 
-/// Tiles are removed and created again, and at the end all are removed.
+/// Tiles are removed, cleared in part and created again, and at the end all are removed.
 fn removals() -> Life {
     let acts = vec![
         Act::Scans(0..3),
         Act::RemoveTiles(2),
         Act::Scans(3..5),
         Act::RemoveTiles(3),
+        Act::Clear(region(1.0, 5.0)),
         Act::Scans(0..1),
         Act::RemoveTiles(1),
     ];
@@ -70,6 +71,11 @@ fn replays() -> Life {
         Act::Scans(10..11),
     ];
     Life::new(keeping_scans(), acts)
+}
+
+/// The same acts on a map with all layers.
+fn with_layers(life: Life) -> Life {
+    Life::new(life.config.with_layers(all_layers()), life.acts)
 }
 
 fn region(low: f64, high: f64) -> Aabb {
@@ -123,6 +129,16 @@ fn power_cuts_some_time_after_a_kill() {
     check_power_cuts_after_kills(&replays(), 192);
 }
 
+#[test]
+fn layers_survive_faults_and_power_cuts_with_their_voxels() {
+    for (life, one_in) in [(removals(), 24), (snapshots(), 80), (replays(), 160)] {
+        let life = with_layers(life);
+        every_operation_fails(&life, 2 * one_in);
+        check_power_cuts(&life, one_in);
+        check_power_cuts_after_kills(&life, 4 * one_in);
+    }
+}
+
 fn random_acts(random: &mut Random) -> Vec<Act> {
     let (mut acts, mut snapshots) = (vec![Act::Scans(0..4)], Vec::new());
     for step in 1..12 {
@@ -169,6 +185,8 @@ fn random_lives_equal_the_naive_map_of_the_remaining_scans() {
         let guarded = keeping_scans().with_sensor_model(sensor_model);
         configs.push(guarded.with_clearing(Clearing::Guarded(Guard::default())));
     }
+    let with_layers = configs.iter().map(|config| config.clone().with_layers(all_layers()));
+    configs.extend(with_layers.collect::<Vec<_>>());
     for seed in 0..cases(12, 48) {
         let life = Life::new(configs[seed as usize % configs.len()].clone(), random_acts(&mut Random(seed)));
         let disk = life.disk();

@@ -1,24 +1,47 @@
 //! Random lives of a mapper compared with the naive map, which is reset to the last flush after a crash.
 
-use crate::harness::name;
+use crate::harness::{all_layers, name};
 use std::collections::BTreeMap;
 use std::path::Path;
+use testkit::attributed_scan::AttributedScan;
 use testkit::memory_folder::memory_folder;
-use testkit::random_scans::{Random, random_scan};
+use testkit::random_scans::Random;
+use testkit::reference_layers::{LayerSums, layers_of};
 use testkit::reference_map::{ReferenceMap, Voxels, voxels_of};
 use testkit::support::cases;
 use testkit::unsynced_disk::UnsyncedDisk;
 use voxtile::integrity::verify;
-use voxtile::operations::{delete_snapshot, revert, snapshots};
+use voxtile::operations::{Part, Prefer, clear, crop, delete_snapshot, merge, revert, snapshots};
 use voxtile::sensor::{Iwlo, SensorModel};
 use voxtile::store::TileStore;
 use voxtile::{
-    InsertMode, MapConfig, MapPath, MapQueries, MapReader, MapView, Mapper, MemoryLimit, OutOfCoreTileMapper,
-    ScanPoints, Storage,
+    Aabb, InsertMode, MapConfig, MapPath, MapQueries, MapReader, MapView, Mapper, MemoryLimit,
+    OutOfCoreTileMapper, ScanPoints, Storage, VoxelIndex,
 };
 
-/// Voxels, and the number of scans.
-type Content = (Voxels, u64);
+/// Content of a naive map.
+#[derive(Clone, Debug, Default, PartialEq)]
+struct Content {
+    voxels: Voxels,
+    layers: LayerSums,
+    /// Number of scans.
+    scans: u64,
+}
+
+impl Content {
+    fn of(reference: &ReferenceMap, scans: u64) -> Self {
+        Self { voxels: reference.voxels.clone(), layers: reference.layers.clone(), scans }
+    }
+
+    fn of_map(map: &impl MapView, scans: u64) -> Self {
+        Self { voxels: voxels_of(map), layers: layers_of(map), scans }
+    }
+
+    fn retain(&mut self, keeps: impl Fn(VoxelIndex) -> bool) {
+        self.voxels.retain(|&voxel, _| keeps(voxel));
+        self.layers.retain(|&voxel, _| keeps(voxel));
+    }
+}
 
 /// Runs one random life of a map.
 fn live(seed: u64, config: &MapConfig) {
@@ -46,11 +69,12 @@ fn live(seed: u64, config: &MapConfig) {
                 let mut some = Vec::new();
                 for _ in 0..1 + random.below(3) {
                     let center = [random.between(-3.0, 3.0), 0.0, 0.0];
-                    some.push(random_scan(&mut random, center, 12));
+                    some.push(AttributedScan::random(&mut random, center, 12));
                 }
-                let together: Vec<&dyn ScanPoints> = some.iter().map(|scan| scan as _).collect();
+                let points: Vec<_> = some.iter().map(AttributedScan::points).collect();
+                let together: Vec<&dyn ScanPoints> = points.iter().map(|scan| scan as _).collect();
                 mapper.insert_all(&together, &mut Vec::new()).unwrap();
-                some.iter().for_each(|scan| reference.insert_scan(scan));
+                some.iter().for_each(|scan| reference.insert_attributed(scan));
                 scans += some.len() as u64;
             }
             6 | 7 => {
@@ -59,19 +83,20 @@ fn live(seed: u64, config: &MapConfig) {
                 let found = mapper.voxel_at(point).unwrap().map(|voxel| voxel.evidence);
                 let found = found.map(|evidence| (evidence.log_odds.to_bits(), evidence.observation_count));
                 assert_eq!(found, reference.voxels.get(&voxel).copied(), "{what}");
+                assert_eq!(mapper.layers_at(point).unwrap(), reference.layers.get(&voxel).cloned(), "{what}");
             }
-            8 => assert_eq!(voxels_of(&mapper), reference.voxels, "{what}"),
+            8 => assert_eq!(Content::of_map(&mapper, scans), Content::of(&reference, scans), "{what}"),
             9 => {
                 mapper.begin_flush().unwrap();
-                begun = Some((reference.voxels.clone(), scans));
+                begun = Some(Content::of(&reference, scans));
             }
             10 => {
                 mapper.flush().unwrap();
-                (flushed, begun) = ((reference.voxels.clone(), scans), None);
+                (flushed, begun) = (Content::of(&reference, scans), None);
             }
             11 | 12 if !is_kept => {
                 mapper.snapshot(&name(snapshot)).unwrap();
-                (flushed, begun) = ((reference.voxels.clone(), scans), None);
+                (flushed, begun) = (Content::of(&reference, scans), None);
                 kept.insert(snapshot, flushed.clone());
             }
             choice => {
@@ -88,16 +113,26 @@ fn live(seed: u64, config: &MapConfig) {
                         revert(at(), &name(snapshot), None, |_, _| ()).unwrap();
                         flushed = kept[snapshot].clone();
                     }
-                    14 => {
+                    14 if random.below(2) == 0 => {
                         let mut store = TileStore::open(UnsyncedDisk::shared(), &path).unwrap();
                         let gone: Vec<_> = store.tiles().iter().filter(|tile| tile.x % 2 == 0).collect();
                         gone.iter().for_each(|tile| store.remove(*tile).unwrap());
                         store.commit(store.metadata().clone(), store.commits().scan_number).unwrap();
-                        flushed.0.retain(|&voxel, _| config.grid.tile_of_voxel(voxel).x % 2 != 0);
+                        flushed.retain(|voxel| config.grid.tile_of_voxel(voxel).x % 2 != 0);
+                    }
+                    14 => {
+                        let region = random_region(&mut random);
+                        clear(at(), &Part::Inside(region), |_, _| ()).unwrap();
+                        flushed.retain(|voxel| !is_in(config, &region, voxel));
+                    }
+                    15 if is_kept => {
+                        let region = random_region(&mut random);
+                        check_derived_maps(&path, (snapshot, &kept[snapshot]), &flushed, &region, &what);
                     }
                     _ => {}
                 }
-                (reference.voxels, scans) = flushed.clone();
+                let Content { voxels, layers, scans: of_flush } = flushed.clone();
+                (reference.voxels, reference.layers, scans) = (voxels, layers, of_flush);
                 mapper = open();
             }
         }
@@ -108,7 +143,7 @@ fn live(seed: u64, config: &MapConfig) {
         }
     }
     mapper.flush().unwrap();
-    assert_eq!(voxels_of(&mapper), reference.voxels, "seed {seed}");
+    assert_eq!(Content::of_map(&mapper, scans), Content::of(&reference, scans), "seed {seed}");
     drop(mapper);
     check_snapshots(&path, &kept, "at the end");
     drop(open());
@@ -116,17 +151,65 @@ fn live(seed: u64, config: &MapConfig) {
     assert_eq!(verification.snapshots, kept.len() as u64);
 }
 
+fn random_region(random: &mut Random) -> Aabb {
+    let min = random.point([-1.0; 3], 2.0);
+    Aabb { min, max: min.map(|low| low + random.between(0.4, 4.0)) }
+}
+
+fn is_in(config: &MapConfig, region: &Aabb, voxel: VoxelIndex) -> bool {
+    let center = config.grid.center_m(voxel);
+    (0..3).all(|k| region.min[k] <= center[k] && center[k] < region.max[k])
+}
+
+/// Crops the map, and merges it with a snapshot.
+fn check_derived_maps(
+    path: &Path,
+    (snapshot, kept): (&str, &Content),
+    now: &Content,
+    region: &Aabb,
+    what: &str,
+) {
+    let folder = memory_folder();
+    let at = |path: &Path| MapPath::on(UnsyncedDisk::shared(), path);
+    let map = MapReader::open(at(path), 1 << 20).unwrap();
+    let before = MapReader::open_snapshot(at(path), &name(snapshot), 1 << 20).unwrap();
+    let config = map.config().clone();
+    let content_of =
+        |name: &str| Content::of_map(&MapReader::open(at(&folder.path().join(name)), 0).unwrap(), 0);
+
+    crop(&map, &Part::Inside(*region), folder.path().join("cropped"), |_, _| ()).unwrap();
+    let mut cropped = Content { scans: 0, ..now.clone() };
+    cropped.retain(|voxel| is_in(&config, region, voxel));
+    assert_eq!(content_of("cropped"), cropped, "{what}");
+
+    let both = [map, before];
+    merge(&both, folder.path().join("merged"), Some(Prefer::Last), |_, _| ()).unwrap();
+    let mut merged = Content { scans: 0, ..now.clone() };
+    merged.retain(|voxel| !kept.voxels.contains_key(&voxel));
+    merged.voxels.extend(kept.voxels.clone());
+    merged.layers.extend(kept.layers.clone());
+    assert_eq!(content_of("merged"), merged, "{what}");
+
+    if matches!(config.sensor_model, SensorModel::LogOdds(_)) {
+        merge(&both, folder.path().join("sum"), None, |_, _| ()).unwrap();
+        let mut sums = now.layers.clone();
+        kept.layers.iter().for_each(|(voxel, more)| sums.entry(*voxel).or_default().add(more));
+        assert_eq!(content_of("sum").layers, sums, "{what}");
+    }
+}
+
 fn check_snapshots(path: &Path, kept: &BTreeMap<&str, Content>, what: &str) {
     let at = || MapPath::on(UnsyncedDisk::shared(), path);
     let infos = snapshots(at()).unwrap();
     assert_eq!(infos.len(), kept.len(), "{what}");
-    for (of, (voxels, scans)) in kept {
+    for (of, content) in kept {
         let reader = MapReader::open_snapshot(at(), &name(of), 1 << 20).unwrap();
-        assert_eq!((&voxels_of(&reader), reader.scan_number()), (voxels, *scans), "{what}: {of}");
+        assert_eq!(Content::of_map(&reader, reader.scan_number()), *content, "{what}: {of}");
         let numbers = reader.scans().unwrap().into_iter().map(|scan| scan.number);
-        assert!(numbers.eq(1..=*scans), "{what}: {of}");
+        assert!(numbers.eq(1..=content.scans), "{what}: {of}");
         let info = infos.iter().find(|info| info.name == *of).unwrap();
-        assert_eq!((info.voxels, info.scan_number), (voxels.len() as u64, *scans), "{what}: {of}");
+        let voxels = content.voxels.len() as u64;
+        assert_eq!((info.voxels, info.scan_number), (voxels, content.scans), "{what}: {of}");
     }
 }
 
@@ -142,6 +225,9 @@ fn random_lives_of_a_map_equal_the_naive_map() {
             .with_write_buffer_bytes((seed as usize % 4) * 3000);
         if seed % 2 == 1 {
             config = config.with_sensor_model(SensorModel::Iwlo(Iwlo::default()));
+        }
+        if seed % 8 < 4 {
+            config = config.with_layers(all_layers());
         }
         if seed % 4 >= 2 {
             config = config.with_storage(Storage::Compact);

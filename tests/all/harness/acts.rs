@@ -4,8 +4,8 @@ use super::scans::{Taken, new_marks, new_poses};
 use std::ops::Range;
 use testkit::faulty_disk::FaultyDisk;
 use voxtile::operations::{
-    NewPoses, OnlineRemap, Remap, ScanSelection, delete_snapshot, mark_moving, remap, remove_points,
-    remove_scans, revert, snapshot,
+    NewPoses, OnlineRemap, Part, Remap, ScanSelection, clear, delete_snapshot, mark_moving, remap,
+    remove_points, remove_scans, revert, snapshot,
 };
 use voxtile::scan::MovingMarks;
 use voxtile::space::TileIndex;
@@ -37,6 +37,8 @@ pub enum Act {
     RemovePoints(Aabb),
     /// Removes one in this many tiles.
     RemoveTiles(i32),
+    /// Makes the voxels in a box unknown.
+    Clear(Aabb),
     Snapshot(&'static str),
     Delete(&'static str),
     Revert(&'static str),
@@ -89,6 +91,7 @@ pub fn perform(disk: &FaultyDisk, config: &MapConfig, before: &State, act: &Act)
             tiles.into_iter().try_for_each(|tile| store.remove(tile))?;
             store.commit(store.metadata().clone(), store.commits().scan_number)
         }
+        Act::Clear(region) => clear(at(disk), &Part::Inside(*region), |_, _| ()).map(drop),
         Act::Snapshot(of) => snapshot(at(disk), &name(of)),
         Act::Delete(of) => delete_snapshot(at(disk), &name(of)),
         Act::Revert(to) => revert(at(disk), &name(to), None, |_, _| ()).map(drop),

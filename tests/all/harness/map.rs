@@ -6,7 +6,8 @@ use voxtile::mapper::KeptSummary;
 use voxtile::operations::{Replay, snapshots};
 use voxtile::store::SnapshotName;
 use voxtile::{
-    Digest, Error, MapConfig, MapPath, MapQueries, MapReader, MemoryLimit, OutOfCoreTileMapper, Result,
+    Digest, Error, Layers, MapConfig, MapPath, MapQueries, MapReader, MemoryLimit, OutOfCoreTileMapper,
+    Result,
 };
 
 /// Folder of the map.
@@ -31,6 +32,10 @@ pub fn config() -> MapConfig {
 /// The same map with kept scans.
 pub fn keeping_scans() -> MapConfig {
     config().with_range(0.3, 3.0).with_kept_scans(true)
+}
+
+pub fn all_layers() -> Layers {
+    Layers { colour: true, intensity_max: Some(255.0), class: true, time: true, shape: true }
 }
 
 /// Replays kept scans with the minimum of memory.

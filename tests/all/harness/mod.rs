@@ -20,8 +20,8 @@ pub use interruption::{EVERY_CRASH, Left, Reached, Subject, faults, sweep, sweep
 pub use job::Job;
 pub use life::{Life, check_files};
 pub use map::{
-    at, config, damage_in, digest_of, is_whole, keeping_scans, make_foreign, map, name, open_or_create,
-    replay, scans, snapshot_names,
+    all_layers, at, config, damage_in, digest_of, is_whole, keeping_scans, make_foreign, map, name,
+    open_or_create, replay, scans, snapshot_names,
 };
 pub use model::{Content, State};
 pub use scans::{Taken, new_poses};

@@ -2,11 +2,13 @@ use super::acts::{Act, is_removed};
 use super::map::{at, name};
 use super::scans::{Taken, new_marks, new_poses};
 use std::collections::BTreeMap;
+use std::mem::take;
 use testkit::faulty_disk::FaultyDisk;
+use testkit::reference_layers::{LayerSums, layers_of};
 use testkit::reference_map::{ReferenceMap, Voxels, voxels_of};
 use voxtile::operations::snapshots;
-use voxtile::scan::ScanPoints;
-use voxtile::{Error, MapConfig, MapReader, MapView};
+use voxtile::scan::{PointFrame, ScanPoints};
+use voxtile::{Error, MapConfig, MapReader, MapView, PointAttributes, VoxelIndex};
 
 /// Content of a naive map.
 #[derive(Clone, Debug, Default)]
@@ -16,28 +18,59 @@ pub struct Content {
     /// Number of the last scan.
     pub scan_number: u64,
     pub voxels: Voxels,
+    pub layers: LayerSums,
 }
 
 impl Content {
     /// Whether a map has exactly this content.
     pub fn is_of(&self, reader: &MapReader) -> bool {
         let is_kept = || !reader.keeps_scans() || kept_scans(reader) == self.scans;
-        reader.scan_number() == self.scan_number && is_kept() && voxels_of(reader) == self.voxels
+        reader.scan_number() == self.scan_number && is_kept() && self.has_voxels_of(reader)
+    }
+
+    fn has_voxels_of(&self, reader: &MapReader) -> bool {
+        voxels_of(reader) == self.voxels && layers_of(reader) == self.layers
+    }
+
+    fn retain(&mut self, keeps: impl Fn(VoxelIndex) -> bool) {
+        self.voxels.retain(|&voxel, _| keeps(voxel));
+        self.layers.retain(|&voxel, _| keeps(voxel));
+    }
+
+    /// Adds these scans to the voxels.
+    fn insert<'a>(&mut self, config: &MapConfig, scans: impl IntoIterator<Item = &'a Taken>) {
+        let mut map = ReferenceMap::new(config);
+        (map.voxels, map.layers) = (take(&mut self.voxels), take(&mut self.layers));
+        for scan in scans {
+            map.insert(&scan.in_world(), &scan.is_moving, &scan.attributes, scan.stamp_ns);
+        }
+        (self.voxels, self.layers) = (map.voxels, map.layers);
+    }
+
+    /// Maps the kept scans again.
+    fn replay(&mut self, config: &MapConfig) {
+        let mut empty = Self::default();
+        empty.insert(config, self.scans.values());
+        (self.voxels, self.layers) = (empty.voxels, empty.layers);
     }
 }
 
 fn kept_scans(reader: &MapReader) -> BTreeMap<u64, Taken> {
     let kept = reader.kept_scans().unwrap().map(|scan| {
         let scan = scan.unwrap();
-        let (mut points, mut intensities) = (Vec::new(), Vec::new());
-        scan.for_each_own_chunk(0..scan.len(), &mut |some, of_some| {
+        let (mut points, mut intensities, mut attributes) =
+            (Vec::new(), Vec::new(), PointAttributes::default());
+        let (range, frame) = (0..scan.len(), PointFrame::Own);
+        scan.for_each_attributed_chunk(range, frame, &mut |some, of_some, attributes_of_some| {
             points.extend_from_slice(some);
             intensities.extend_from_slice(of_some.unwrap());
+            attributes.extend(attributes_of_some);
             true
         })
         .unwrap();
         let is_moving = scan.moving().map_or(vec![false; points.len()], |marks| marks.iter().collect());
-        (scan.number(), Taken { points, intensities, is_moving, pose: scan.world_from_sensor().unwrap() })
+        let (stamp_ns, pose) = (scan.stamp_ns(), scan.world_from_sensor().unwrap());
+        (scan.number(), Taken { points, intensities, attributes, stamp_ns, is_moving, pose })
     });
     kept.collect()
 }
@@ -56,7 +89,7 @@ impl State {
         match act {
             Act::Scans(seeds) => {
                 let scans: Vec<Taken> = seeds.clone().map(Taken::new).collect();
-                now.voxels = with_scans(config, now.voxels, &scans);
+                now.insert(config, &scans);
                 for scan in scans {
                     now.scan_number += 1;
                     if config.keeps_scans {
@@ -68,7 +101,7 @@ impl State {
                 for (number, pose) in new_poses(&now.scans, *seed, *rest) {
                     now.scans.get_mut(&number).unwrap().pose = pose;
                 }
-                now.voxels = with_scans(config, Voxels::new(), now.scans.values());
+                now.replay(config);
             }
             Act::MoveOnline { seed, rest, meanwhile } => {
                 let moved = self.after(&Act::Move { seed: *seed, rest: *rest }, config);
@@ -78,29 +111,23 @@ impl State {
                 for (number, is_moving) in new_marks(&now.scans, *seed, *rest) {
                     now.scans.get_mut(&number).unwrap().is_moving = is_moving;
                 }
-                now.voxels = with_scans(config, Voxels::new(), now.scans.values());
+                now.replay(config);
             }
             Act::RemoveScans(first, last) => {
                 now.scans.retain(|number, _| !(first..=last).contains(&number));
-                now.voxels = with_scans(config, Voxels::new(), now.scans.values());
+                now.replay(config);
             }
             Act::RemovePoints(region) => {
-                for scan in now.scans.values_mut() {
-                    let world = scan.in_world();
-                    let is_inside = |point: [f64; 3]| {
-                        (0..3).all(|k| region.min[k] <= point[k] && point[k] < region.max[k])
-                    };
-                    let kept: Vec<_> =
-                        (0..world.points.len()).filter(|&k| !is_inside(world.points[k])).collect();
-                    scan.points = kept.iter().map(|&k| scan.points[k]).collect();
-                    scan.intensities = kept.iter().map(|&k| scan.intensities[k]).collect();
-                    scan.is_moving = kept.iter().map(|&k| scan.is_moving[k]).collect();
-                }
-                now.voxels = with_scans(config, Voxels::new(), now.scans.values());
+                now.scans.values_mut().for_each(|scan| scan.remove_points(region));
+                now.replay(config);
             }
             Act::RemoveTiles(one_in) => {
-                now.voxels.retain(|&voxel, _| !is_removed(*one_in, config.grid.tile_of_voxel(voxel)));
+                now.retain(|voxel| !is_removed(*one_in, config.grid.tile_of_voxel(voxel)));
             }
+            Act::Clear(region) => now.retain(|voxel| {
+                let center = config.grid.center_m(voxel);
+                !(0..3).all(|k| region.min[k] <= center[k] && center[k] < region.max[k])
+            }),
             Act::Snapshot(of) => drop(snapshots.insert(*of, now.clone())),
             Act::Delete(of) => assert!(snapshots.remove(of).is_some()),
             Act::Revert(to) => now = snapshots[to].clone(),
@@ -121,12 +148,4 @@ impl State {
             && names.iter().eq(self.snapshots.keys())
             && self.snapshots.iter().all(|(of, content)| content.is_of(&open(of)))
     }
-}
-
-/// Returns the voxels after these scans.
-fn with_scans<'a>(config: &MapConfig, before: Voxels, scans: impl IntoIterator<Item = &'a Taken>) -> Voxels {
-    let mut map = ReferenceMap::new(config);
-    map.voxels = before;
-    scans.into_iter().for_each(|scan| map.insert_marked(&scan.in_world(), &scan.is_moving));
-    map.voxels
 }

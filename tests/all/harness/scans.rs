@@ -1,12 +1,15 @@
 use std::collections::BTreeMap;
+use testkit::attributed_scan::{random_attributes, random_stamp_ns, retain_attributes, retain_marked};
 use testkit::random_scans::{Random, random_scan};
-use voxtile::{Mapper, OutOfCoreTileMapper, Pose, Result, Scan, ScanRef};
+use voxtile::{Aabb, Mapper, OutOfCoreTileMapper, PointAttributes, Pose, Result, Scan, ScanRef};
 
 /// A scan in the sensor's frame, with its pose.
 #[derive(Clone, Debug)]
 pub struct Taken {
     pub points: Vec<[f64; 3]>,
     pub intensities: Vec<f32>,
+    pub attributes: PointAttributes,
+    pub stamp_ns: Option<i64>,
     /// Whether each point is marked as moving.
     pub is_moving: Vec<bool>,
     pub pose: Pose,
@@ -22,7 +25,9 @@ impl Taken {
         let mut intensities = scan.intensities.unwrap();
         intensities.push(-0.0);
         let is_moving = vec![false; points.len()];
-        Self { points, intensities, is_moving, pose: random_pose(&mut random, seed) }
+        let pose = random_pose(&mut random, seed);
+        let attributes = random_attributes(&mut random, points.len());
+        Self { points, intensities, attributes, stamp_ns: random_stamp_ns(&mut random), is_moving, pose }
     }
 
     pub fn in_world(&self) -> Scan {
@@ -31,7 +36,20 @@ impl Taken {
 
     pub fn insert_into(&self, mapper: &mut OutOfCoreTileMapper) -> Result<()> {
         let points = ScanRef::in_sensor(self.pose, &self.points).with_intensities(&self.intensities)?;
+        let points = points.with_attributes(&self.attributes)?;
+        let points = self.stamp_ns.map_or(points, |stamp_ns| points.with_stamp_ns(stamp_ns));
         mapper.insert_points(&points).map(drop)
+    }
+
+    /// Removes the points whose world coordinates are in a box.
+    pub fn remove_points(&mut self, region: &Aabb) {
+        let is_outside =
+            |point: &[f64; 3]| !(0..3).all(|k| region.min[k] <= point[k] && point[k] < region.max[k]);
+        let keeps: Vec<bool> = self.in_world().points.iter().map(is_outside).collect();
+        retain_marked(&mut self.points, &keeps);
+        retain_marked(&mut self.intensities, &keeps);
+        retain_attributes(&mut self.attributes, &keeps);
+        retain_marked(&mut self.is_moving, &keeps);
     }
 }
 
@@ -42,9 +60,10 @@ impl PartialEq for Taken {
             let points: Vec<_> = scan.points.iter().map(|point| point.map(f64::to_bits)).collect();
             let intensities: Vec<_> = scan.intensities.iter().map(|value| value.to_bits()).collect();
             let ([x, y, z], [a, b, c, d]) = (scan.pose.position_m(), scan.pose.quaternion());
-            (points, intensities, scan.is_moving.clone(), [x, y, z, a, b, c, d].map(f64::to_bits))
+            (points, intensities, [x, y, z, a, b, c, d].map(f64::to_bits))
         };
-        bits(self) == bits(other)
+        let others = |scan: &Self| (scan.is_moving.clone(), scan.attributes.clone(), scan.stamp_ns);
+        bits(self) == bits(other) && others(self) == others(other)
     }
 }
 

@@ -1,7 +1,9 @@
+use crate::attributed_scan::AttributedScan;
 use crate::reference_clearing::ScanMarks;
+use crate::reference_layers::{LayerSums, PointSample, add_hit};
 use std::collections::BTreeMap;
 use voxtile::mapper::MapView;
-use voxtile::scan::{PointBatch, Scan};
+use voxtile::scan::{PointAttributes, PointBatch, Scan};
 use voxtile::sensor::Observation::{self, Hit, Miss};
 use voxtile::space::{Point, VoxelIndex};
 use voxtile::{InsertMode, MapConfig};
@@ -13,26 +15,47 @@ pub type Voxels = BTreeMap<VoxelIndex, (u64, i32)>;
 pub struct ReferenceMap {
     pub config: MapConfig,
     pub voxels: Voxels,
+    pub layers: LayerSums,
     /// The voxel of every update so far, in order.
     pub updated: Vec<VoxelIndex>,
 }
 
 impl ReferenceMap {
     pub fn new(config: &MapConfig) -> Self {
-        Self { config: config.clone(), voxels: Voxels::new(), updated: Vec::new() }
+        Self { config: config.clone(), voxels: Voxels::new(), layers: LayerSums::new(), updated: Vec::new() }
     }
 
     pub fn insert_scan(&mut self, scan: &Scan) {
         self.insert_marked(scan, &[]);
     }
 
-    /// Inserts a scan of which some points are marked as moving; no mark means that the point did not move.
     pub fn insert_marked(&mut self, scan: &Scan, is_moving: &[bool]) {
+        self.insert(scan, is_moving, &PointAttributes::default(), None);
+    }
+
+    pub fn insert_attributed(&mut self, AttributedScan { scan, attributes, stamp_ns }: &AttributedScan) {
+        self.insert(scan, &[], attributes, *stamp_ns);
+    }
+
+    /// Inserts a scan of which some points are marked as moving; no mark means that the point did not move.
+    pub fn insert(
+        &mut self,
+        scan: &Scan,
+        is_moving: &[bool],
+        attributes: &PointAttributes,
+        stamp_ns: Option<i64>,
+    ) {
         let mut once: BTreeMap<VoxelIndex, Observation> = BTreeMap::new();
         for (number, &point) in scan.points.iter().enumerate() {
             let intensity = scan.intensities.as_ref().map_or(0.0, |all| all[number]);
             let Some((misses, end)) = self.ray(scan.origin, point, intensity) else { continue };
             let end = end.filter(|_| is_moving.get(number) != Some(&true));
+            if end.is_some() {
+                let intensity = scan.intensities.as_ref().map(|all| all[number]);
+                let (colour, class) = (attributes.all().colour(number), attributes.all().class(number));
+                let sample = PointSample { intensity, colour, class, stamp_ns };
+                add_hit(&mut self.layers, &self.config, point, sample);
+            }
             let misses = misses.into_iter().map(|voxel| (voxel, Miss));
             for (voxel, seen) in misses.chain(end.map(|voxel| (voxel, Hit(intensity)))) {
                 if self.config.rays.insert_mode == InsertMode::PerRay {
@@ -70,6 +93,11 @@ impl ReferenceMap {
             let counts = !(model.needs_intensity() && intensity.is_nan()) && model.is_evidence(seen);
             if let Some(voxel) = self.config.grid.voxel_of(point).filter(|_| counts) {
                 self.update(voxel, seen);
+                if seen != Miss {
+                    let intensity = batch.intensities.map(|all| all[number]);
+                    let sample = PointSample { intensity, ..PointSample::default() };
+                    add_hit(&mut self.layers, &self.config, point, sample);
+                }
             }
         }
     }
