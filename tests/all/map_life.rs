@@ -11,7 +11,7 @@ use testkit::reference_map::voxels_of;
 use testkit::support::cases;
 use voxtile::sensor::{Iwlo, SensorModel};
 use voxtile::store::TileStore;
-use voxtile::{Aabb, Clearing, Guard, InsertMode, MapQueries, MapReader};
+use voxtile::{Aabb, Clearing, Grid, Guard, InsertMode, MapConfig, MapQueries, MapReader};
 
 /// Tiles are removed, cleared in part and created again, and at the end all are removed.
 fn removals() -> Life {
@@ -75,7 +75,13 @@ fn replays() -> Life {
 
 /// The same acts on a map with all layers.
 fn with_layers(life: Life) -> Life {
-    Life::new(life.config.with_layers(all_layers()), life.acts)
+    Life::new(layered(life.config), life.acts)
+}
+
+/// A map with all layers, of larger voxels that several scans hit.
+fn layered(mut config: MapConfig) -> MapConfig {
+    config.grid = Grid::new(1.6, 6.4).unwrap();
+    config.with_layers(all_layers())
 }
 
 fn region(low: f64, high: f64) -> Aabb {
@@ -185,8 +191,8 @@ fn random_lives_equal_the_naive_map_of_the_remaining_scans() {
         let guarded = keeping_scans().with_sensor_model(sensor_model);
         configs.push(guarded.with_clearing(Clearing::Guarded(Guard::default())));
     }
-    let with_layers = configs.iter().map(|config| config.clone().with_layers(all_layers()));
-    configs.extend(with_layers.collect::<Vec<_>>());
+    let layered = configs.iter().cloned().map(layered);
+    configs.extend(layered.collect::<Vec<_>>());
     for seed in 0..cases(12, 48) {
         let life = Life::new(configs[seed as usize % configs.len()].clone(), random_acts(&mut Random(seed)));
         let disk = life.disk();

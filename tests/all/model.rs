@@ -15,7 +15,7 @@ use voxtile::operations::{Part, Prefer, clear, crop, delete_snapshot, merge, rev
 use voxtile::sensor::{Iwlo, SensorModel};
 use voxtile::store::TileStore;
 use voxtile::{
-    Aabb, InsertMode, MapConfig, MapPath, MapQueries, MapReader, MapView, Mapper, MemoryLimit,
+    Aabb, Grid, InsertMode, MapConfig, MapPath, MapQueries, MapReader, MapView, Mapper, MemoryLimit,
     OutOfCoreTileMapper, ScanPoints, Storage, VoxelIndex,
 };
 
@@ -153,7 +153,7 @@ fn live(seed: u64, config: &MapConfig) {
 
 fn random_region(random: &mut Random) -> Aabb {
     let min = random.point([-1.0; 3], 2.0);
-    Aabb { min, max: min.map(|low| low + random.between(0.4, 4.0)) }
+    Aabb { min, max: min.map(|low| low + random.between(0.8, 4.0)) }
 }
 
 fn is_in(config: &MapConfig, region: &Aabb, voxel: VoxelIndex) -> bool {
@@ -227,6 +227,8 @@ fn random_lives_of_a_map_equal_the_naive_map() {
             config = config.with_sensor_model(SensorModel::Iwlo(Iwlo::default()));
         }
         if seed % 8 < 4 {
+            // Larger voxels, which several scans hit.
+            config.grid = Grid::new(0.8, 6.4).unwrap();
             config = config.with_layers(all_layers());
         }
         if seed % 4 >= 2 {
