@@ -4,8 +4,8 @@
 # hostile peer. Outputs must equal those of `voxtile export`; services are also called. Passes with a message if Python
 # or PyPI is missing. The test `rclpy` uses ROS 2 itself: rclpy of Jazzy over Fast DDS, from PyPI (for Python 3.11).
 #
-# check.sh [friendly] [hostile] [types] [variants] [odometry] [launch] [path] [real] [sensors] [flood] [monitoring]
-#          [rclpy] [zenoh] [sizes]
+# check.sh [friendly] [hostile] [types] [variants] [odometry] [launch] [path] [layers] [real] [sensors] [flood]
+#          [monitoring] [rclpy] [zenoh] [sizes]
 #
 # sizes, only when named, prints how long clients of each middleware wait for messages of up to 50 MB.
 #
@@ -43,7 +43,7 @@ if [ -z "$program" ] && [ "$*" != zenoh ]; then
     program=$built/voxtile-ros2
 fi
 voxtile=$(realpath "$voxtile") program=${program:+$(realpath "$program")}
-radius=2.5 max_z=1.0 inflation_range=2.2
+radius=2.5 max_z=1.0 inflation_range=2.2 layers=colour,intensity=100,class,time,shape
 outputs="--max-range 60 --publish-every 0.2 --publish-radius $radius --projected-radius 30 --occupancy-max-z $max_z"
 outputs="$outputs --inflation-range $inflation_range"
 
@@ -78,6 +78,7 @@ play() {
     case $kind in
     odometry) start --resolution $resolution $outputs --odometry /odom --frame-id odom ;;
     path) start --resolution $resolution --max-range 60 --publish-every 0.2 --path /slam_path --flush-every 2 ;;
+    layers) start --resolution $resolution --max-range 60 --layers $layers --publish-every 0.2 ;;
     sensors) start --resolution $resolution $outputs --cloud /cloud_in --cloud /rear ;;
     launch)
         # Starts the node as `ros2 launch` does, with a namespace, a name, parameters and remappings.
@@ -89,6 +90,8 @@ play() {
     esac
     if [ $kind = path ]; then
         listen 20 octomap_full
+    elif [ $kind = layers ]; then
+        listen $seconds octomap_point_cloud_centers
     elif [ $kind = launch ]; then
         listen $seconds octomap_binary robot/octomap_full hall/octomap_binary
     else
@@ -127,12 +130,12 @@ flood() {
 # Dropped clouds are explained in the log, metrics and health are served, and files of octomap_server are read.
 monitoring() {
     local address options topics="mapped unknown registered malformed late"
-    printf 'octomap_server:\n  ros__parameters:\n    filter_ground_plane: true\n' >"$work/octomap_server.yaml"
+    printf 'octomap_server:\n  ros__parameters:\n    filter_ground_plane: some\n' >"$work/octomap_server.yaml"
     local status=0 refusal
     refusal=$("$program" -o "$map" --params-file "$work/octomap_server.yaml" 2>&1) || status=$?
-    [ $status = 2 ] && [[ $refusal == *"octomap_server.yaml:3: parameter filter_ground_plane is true"* ]] ||
-        fail "a ground filter is not refused: $refusal"
-    sed -i s/true/false/ "$work/octomap_server.yaml"
+    [ $status = 2 ] && [[ $refusal == *"octomap_server.yaml:3: parameter filter_ground_plane: invalid type"* ]] ||
+        fail "a wrong value is not refused: $refusal"
+    sed -i s/some/false/ "$work/octomap_server.yaml"
     # `cloud_in` is the default of the launch file.
     options=$("$python" crates/ros2/tests/launch_file.py "output:=$map" "params_file:=$work/octomap_server.yaml" \
         metrics:=0) || fail "the launch file"
@@ -230,7 +233,7 @@ sizes() {
 
 # Folder of real clouds, if available.
 street=${VOXTILE_DATA:-../shared/data}/mulran_riverside02_a
-for kind in ${*:-friendly hostile types variants odometry launch path real sensors flood monitoring rclpy zenoh}; do
+for kind in ${*:-friendly hostile types variants odometry launch path layers real sensors flood monitoring rclpy zenoh}; do
     map=$work/$kind count=30 resolution=0.1 seconds=12
     if [ $kind = zenoh ] || [ $kind = rclpy ] || [ $kind = sizes ]; then
         $kind
@@ -280,6 +283,7 @@ for kind in ${*:-friendly hostile types variants odometry launch path real senso
         continue
         ;;
     odometry) built_of -o "$map.built" --odometry /odom ;;
+    layers) built_of -o "$map.built" --layers $layers ;;
     path)
         # The path covers only the first clouds; later ones keep their poses.
         built_of -o "$map.built" --keep-scans --count $count
@@ -297,6 +301,14 @@ for kind in ${*:-friendly hostile types variants odometry launch path real senso
     fi
     of_node=$("$voxtile" digest "$map") of_bag=$("$voxtile" digest "$map.built")
     [ "$of_node" = "$of_bag" ] || fail "the map of the node differs: $of_node, not $of_bag"
+    if [ $kind = layers ]; then
+        of_node=$("$voxtile" digest --layers "$map") of_bag=$("$voxtile" digest --layers "$map.built")
+        [ "$of_node" = "$of_bag" ] || fail "the layers of the node differ: $of_node, not $of_bag"
+        "$voxtile" export "$map" -o "$map.csv" >/dev/null
+        "$python" crates/ros2/tests/outputs.py colours "$work/$kind.outputs" "$map.csv" || fail "the colours differ"
+        echo "$kind: $of_node"
+        continue
+    fi
     if [ $kind = path ]; then
         # The remapped tiles were published, and no scan was mapped twice.
         grep -q 'remapped: 30 of' "$work/$kind.log" || fail "nothing was remapped"

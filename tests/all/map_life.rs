@@ -137,7 +137,7 @@ fn power_cuts_some_time_after_a_kill() {
 
 #[test]
 fn layers_survive_faults_and_power_cuts_with_their_voxels() {
-    for (life, one_in) in [(removals(), 24), (snapshots(), 80), (replays(), 160)] {
+    for (life, one_in) in [(removals(), 48), (snapshots(), 160), (replays(), 320)] {
         let life = with_layers(life);
         every_operation_fails(&life, 2 * one_in);
         check_power_cuts(&life, one_in);

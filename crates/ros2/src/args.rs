@@ -1,5 +1,7 @@
 use crate::clearing_rule::ClearingRule;
 use crate::distances::Distances;
+use crate::ground_filter::GroundFilter;
+use crate::layer_list::LayerList;
 use crate::listen_address::ListenAddress;
 use crate::log_format::LogFormat;
 use crate::names::Names;
@@ -81,7 +83,8 @@ pub struct Args {
     /// Cut rays at this length
     #[arg(long, value_name = "M")]
     pub max_range: Option<f64>,
-    /// Ignore points with a smaller x in the map frame: neither hits nor free space
+    /// Ignore points with a smaller x in the map frame, with --filter-ground-plane in the base frame: neither hits nor
+    /// free space
     #[arg(long, value_name = "M", allow_negative_numbers = true)]
     pub point_cloud_min_x: Option<f64>,
     /// Ignore points with a larger x in the map frame
@@ -99,6 +102,24 @@ pub struct Args {
     /// Ignore points with a larger z in the map frame
     #[arg(long, value_name = "M", allow_negative_numbers = true)]
     pub point_cloud_max_z: Option<f64>,
+    /// Points of the ground clear space, but are no obstacles. The ground is a level plane near z = 0 of the base frame
+    #[arg(long)]
+    pub filter_ground_plane: bool,
+    /// Frame of the ground filter
+    #[arg(long, value_name = "FRAME", default_value = "base_footprint")]
+    pub base_frame_id: String,
+    /// Largest distance of ground points from their plane
+    #[arg(long, value_name = "M", default_value_t = 0.04)]
+    pub ground_filter_distance: f64,
+    /// Largest angle between the plane of the ground and the horizontal, in radians
+    #[arg(long, value_name = "RAD", default_value_t = 0.15)]
+    pub ground_filter_angle: f64,
+    /// Largest distance of the plane of the ground from the origin of the base frame
+    #[arg(long, value_name = "M", default_value_t = 0.07)]
+    pub ground_filter_plane_distance: f64,
+    /// Layers of a new map, from fields of clouds: colour,intensity=MAX,class,time,shape
+    #[arg(long, value_name = "LAYERS")]
+    pub layers: Option<LayerList>,
     /// Occupancy probability of a hit, for a new map [default: 0.7]
     #[arg(long, value_name = "P")]
     pub hit: Option<f64>,
@@ -403,6 +424,26 @@ impl Args {
             *limits_m = [min, max];
         }
         Ok(PointLimits(box_m))
+    }
+
+    /// Returns the ground filter, if there is one.
+    ///
+    /// # Errors
+    ///
+    /// Invalid lengths or an invalid angle.
+    pub fn ground_filter(&self) -> anyhow::Result<Option<GroundFilter>> {
+        for (option, value) in [
+            ("distance", self.ground_filter_distance),
+            ("angle", self.ground_filter_angle),
+            ("plane-distance", self.ground_filter_plane_distance),
+        ] {
+            ensure!(value > 0.0, "--ground-filter-{option}: {value} is not valid; give a number above 0");
+        }
+        Ok(self.filter_ground_plane.then_some(GroundFilter {
+            distance_m: self.ground_filter_distance,
+            angle_rad: self.ground_filter_angle,
+            plane_distance_m: self.ground_filter_plane_distance,
+        }))
     }
 
     /// Returns the interval between publications.

@@ -1,5 +1,5 @@
+use crate::cloud_poses::CloudPoses;
 use std::time::Instant;
-use voxtile_formats::RigidPose;
 
 /// A `sensor_msgs/PointCloud2` that waits for its pose. Its points are still encoded as CDR.
 #[derive(Clone, Debug)]
@@ -12,6 +12,6 @@ pub struct Cloud {
     /// Additional memory of the decoded points.
     pub points_bytes: usize,
     pub arrived: Instant,
-    /// Pose of the sensor, if it was looked up before mapping.
-    pub pose: Option<RigidPose>,
+    /// Poses, if they were looked up before mapping.
+    pub poses: Option<CloudPoses>,
 }

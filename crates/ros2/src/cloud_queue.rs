@@ -1,8 +1,8 @@
 use crate::cloud::Cloud;
+use crate::cloud_poses::CloudPoses;
 use crate::counters::Counters;
 use crate::when_behind::WhenBehind;
 use std::collections::VecDeque;
-use voxtile_formats::RigidPose;
 
 /// Queue of clouds, oldest first, with bounded memory. Each cloud reserves the memory of its decoded points when it is
 /// queued. A taken cloud keeps its reservation until the next one is taken, so decoded points always fit.
@@ -82,9 +82,9 @@ impl CloudQueue {
 
     /// Looks up the poses of queued clouds and stores them in the clouds, because the caller discards old transforms
     /// next.
-    pub fn settle(&mut self, pose_of: impl Fn(&Cloud) -> Option<RigidPose>) {
-        for cloud in self.clouds.iter_mut().filter(|cloud| cloud.pose.is_none()).take(MAX_SETTLED) {
-            cloud.pose = pose_of(cloud);
+    pub fn settle(&mut self, poses_of: impl Fn(&Cloud) -> Option<CloudPoses>) {
+        for cloud in self.clouds.iter_mut().filter(|cloud| cloud.poses.is_none()).take(MAX_SETTLED) {
+            cloud.poses = poses_of(cloud);
         }
     }
 
@@ -142,7 +142,7 @@ mod tests {
 
     fn cloud(topic: usize, stamp_ns: i64) -> Cloud {
         let (frame, cdr) = (String::new(), vec![0; 744]);
-        Cloud { topic, stamp_ns, frame, cdr, points_bytes: 0, arrived: Instant::now(), pose: None }
+        Cloud { topic, stamp_ns, frame, cdr, points_bytes: 0, arrived: Instant::now(), poses: None }
     }
 
     fn stamps(queue: &mut CloudQueue) -> Vec<i64> {

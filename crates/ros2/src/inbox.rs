@@ -1,6 +1,7 @@
 use crate::args::Args;
 use crate::cloud::Cloud;
 use crate::cloud_points::CloudPoints;
+use crate::cloud_poses::CloudPoses;
 use crate::cloud_queue::{CloudQueue, bytes_of};
 use crate::counters::Counters;
 use crate::drop_warnings::DropWarnings;
@@ -8,7 +9,8 @@ use crate::transform_buffer::TransformBuffer;
 use crate::transport::Message;
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
-use voxtile_formats::RigidPose;
+use voxtile::scan::AttributeSet;
+use voxtile_formats::read::AttributeValues;
 use voxtile_formats::ros::messages::{Header, MessageKind, PointCloud2, StampedPose, decode_poses};
 use voxtile_formats::ros::{Wire, WireError};
 
@@ -30,6 +32,8 @@ struct State {
     /// Last received path, until it is taken.
     path: Option<Vec<StampedPose>>,
     fixed_frame: String,
+    /// Attributes of points that the map takes.
+    attributes: AttributeSet,
     is_closed: bool,
 }
 
@@ -48,13 +52,20 @@ impl Inbox {
             warnings,
             path: None,
             fixed_frame,
+            attributes: AttributeSet::NONE,
             is_closed: false,
         };
         Self { state: Mutex::new(state), changed: Condvar::new() }
     }
 
+    /// Sets the attributes of points that the map takes.
+    pub fn want_attributes(&self, attributes: AttributeSet) {
+        self.lock().attributes = attributes;
+    }
+
     pub fn put_cloud(&self, topic: usize, cdr: Vec<u8>) {
-        let head = head(&cdr);
+        let attributes = self.lock().attributes;
+        let head = head(&cdr, attributes);
         let mut state = self.lock();
         state.counters.received += 1;
         if let Some((_, arrived)) = state.arrived.get_mut(topic) {
@@ -70,7 +81,7 @@ impl Inbox {
         };
         let (stamp_ns, frame) = (header.stamp_ns, header.frame_id);
         let mut cloud =
-            Cloud { topic, stamp_ns, frame, cdr, points_bytes, arrived: Instant::now(), pose: None };
+            Cloud { topic, stamp_ns, frame, cdr, points_bytes, arrived: Instant::now(), poses: None };
         while state.queue.must_wait(&cloud) && !state.is_closed {
             state = self.changed.wait(state).unwrap_or_else(PoisonError::into_inner);
         }
@@ -127,8 +138,8 @@ impl Inbox {
         self.lock().path.take()
     }
 
-    /// Returns the next cloud with its pose, or `None` after `max_wait`.
-    pub fn take(&self, max_wait: Duration) -> Option<(Cloud, RigidPose)> {
+    /// Returns the next cloud with its poses, or `None` after `max_wait`.
+    pub fn take(&self, max_wait: Duration) -> Option<(Cloud, CloudPoses)> {
         let mut state = self.lock();
         // The previous cloud is mapped: release its memory and wake the threads that wait for memory.
         state.queue.release_taken();
@@ -213,8 +224,9 @@ impl Inbox {
 }
 
 /// Returns the header of a complete cloud and the memory of its decoded points.
-fn head(cdr: &[u8]) -> Result<(Header, usize), WireError> {
-    let cloud = PointCloud2::decode(Wire::Cdr, cdr)?;
+fn head(cdr: &[u8], attributes: AttributeSet) -> Result<(Header, usize), WireError> {
+    let mut cloud = PointCloud2::decode(Wire::Cdr, cdr)?;
+    cloud.read_attributes(attributes, AttributeValues::default());
     // No transform can match an empty frame, and later clouds of the topic would wait behind this one.
     if cloud.header.frame_id.is_empty() {
         return Err(WireError { byte: 0, reason: "the cloud has an empty frame_id".to_owned() });

@@ -2,7 +2,7 @@ use crate::health::Health;
 use crate::local_share::LocalShare;
 use crate::messages::{Header, Time};
 use std::sync::{Mutex, MutexGuard, PoisonError};
-use voxtile::{Grid, LiveReader, LiveView, MapView, Point};
+use voxtile::{Grid, Layers, LiveReader, LiveView, MapView, Point};
 
 /// Shared read access to the map during mapping, with the last sensor position.
 #[derive(Debug)]
@@ -10,6 +10,8 @@ pub struct LiveMap {
     frame: String,
     /// Does not change when the map is reopened.
     grid: Grid,
+    /// Does not change either.
+    layers: Layers,
     state: Mutex<State>,
     local: LocalShare,
 }
@@ -44,10 +46,11 @@ impl LiveMap {
         let view = reader.view();
         let (grid, version) =
             (view.config().grid, MapVersion { opening: 0, scan_number: view.scan_number() });
+        let layers = view.config().layers();
         drop(view);
         let moment = Moment { version, sensor_m, stamp_ns };
         let state = Mutex::new(State { reader, moment, health: Health::default() });
-        Self { frame, grid, state, local: LocalShare::default() }
+        Self { frame, grid, layers, state, local: LocalShare::default() }
     }
 
     pub fn note_scan(&self, scan_number: u64, sensor_m: Point, stamp_ns: i64) {
@@ -77,6 +80,10 @@ impl LiveMap {
 
     pub fn grid(&self) -> &Grid {
         &self.grid
+    }
+
+    pub fn layers(&self) -> &Layers {
+        &self.layers
     }
 
     pub fn local(&self) -> &LocalShare {

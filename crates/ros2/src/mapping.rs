@@ -1,13 +1,14 @@
 use crate::args::Args;
 use crate::cloud::Cloud;
-use crate::cloud_points::CloudPoints;
+use crate::cloud_poses::CloudPoses;
+use crate::cloud_reader::{CloudReader, attributes_of};
 use crate::first_map;
 use crate::health::Health;
 use crate::inbox::Inbox;
 use crate::latencies::Latencies;
+use crate::layer_list::LayerList;
 use crate::live_map::LiveMap;
 use crate::local_mapping::LocalMapping;
-use crate::point_limits::PointLimits;
 use crate::refusal::Refusal;
 use crate::remapping::{self, Remapping};
 use crate::repeated::{Repeated, counted};
@@ -23,9 +24,7 @@ use voxtile::{
     Aabb, Clearing, Error, MapConfig, MapReader, MapView, Mapper, MemoryLimit, OutOfCoreTileMapper, Point,
     Stop,
 };
-use voxtile_formats::RigidPose;
-use voxtile_formats::ros::Wire;
-use voxtile_formats::ros::messages::{PointCloud2, StampedPose};
+use voxtile_formats::ros::messages::StampedPose;
 
 /// Mapping thread: maps clouds from the inbox and flushes at an interval.
 pub struct Mapping {
@@ -34,7 +33,7 @@ pub struct Mapping {
     live: Arc<LiveMap>,
     local: LocalMapping,
     latencies: Latencies,
-    point_limits: PointLimits,
+    reader: CloudReader,
     orders: Receiver<PlacedOrder>,
     /// Save requests, each with the scan that must become durable.
     saves: Vec<(u64, PlacedOrder)>,
@@ -96,6 +95,12 @@ impl Mapping {
                 if let Some(file) = &args.octomap_path {
                     log::info!("--octomap-path {} is ignored: the map exists", file.display());
                 }
+                if let Some(LayerList(wanted)) = args.layers.filter(|wanted| wanted.0 != config.layers()) {
+                    log::warn!(
+                        "--layers {wanted} is ignored: the map exists, and its layers are {}",
+                        config.layers()
+                    );
+                }
                 ensure!(
                     config.keeps_scans || !is_followed,
                     "--path: the map {} has no kept scans and cannot follow a path; create a new map",
@@ -107,6 +112,10 @@ impl Mapping {
                 let new = |config: MapConfig| -> anyhow::Result<MapConfig> {
                     let config = config.with_sensor_model(args.sensor_model()?);
                     let config = config.with_clearing(args.clearing.map(Clearing::from));
+                    let config = match args.layers {
+                        Some(LayerList(layers)) => config.with_layers(layers),
+                        None => config,
+                    };
                     Ok(config.with_kept_scans(args.keep_scans || is_followed))
                 };
                 if let Some(file) = &args.octomap_path {
@@ -139,6 +148,8 @@ impl Mapping {
         let (sensor_m, stamp_ns) = last_sensor(&args.output);
         let frame = args.frame_id.trim_start_matches('/').to_owned();
         let live = Arc::new(LiveMap::new(frame, mapper.reader()?, sensor_m, stamp_ns));
+        let layers = mapper.config().layers();
+        inbox.want_attributes(attributes_of(&layers));
         let parameters = args.local_parameters(mapper.config())?;
         let local = LocalMapping::new(parameters, args.extent()?.radius_m, live.clone());
         let now = Instant::now();
@@ -149,7 +160,7 @@ impl Mapping {
             live,
             local,
             latencies: Latencies::default(),
-            point_limits: args.point_limits()?,
+            reader: CloudReader::new(args, layers)?,
             orders,
             saves: Vec::new(),
             path: None,
@@ -183,8 +194,8 @@ impl Mapping {
     /// The map can no longer be used, or cannot be written at the end.
     pub fn run(mut self, stop: &Stop) -> anyhow::Result<()> {
         while !stop.is_set() {
-            if let Some((cloud, pose)) = self.inbox.take(WAIT)
-                && let Err(error) = self.insert(&cloud, &pose)
+            if let Some((cloud, poses)) = self.inbox.take(WAIT)
+                && let Err(error) = self.insert(&cloud, &poses)
             {
                 return self.give_up(error);
             }
@@ -450,17 +461,24 @@ impl Mapping {
     /// # Errors
     ///
     /// The map can no longer be used.
-    fn insert(&mut self, cloud: &Cloud, world_from_sensor: &RigidPose) -> voxtile::Result<()> {
-        // The inbox decoded it before: it is complete, and memory for its points is reserved.
-        let Ok(message) = PointCloud2::decode(Wire::Cdr, &cloud.cdr) else { return Ok(()) };
-        let mut points = CloudPoints::of(&message);
-        points.limit(&self.point_limits, world_from_sensor);
-        let scan = points.scan(world_from_sensor, cloud.stamp_ns);
-        match scan.and_then(|scan| Ok((scan, self.mapper.insert_points(&scan)?))) {
-            Ok((scan, report)) => {
+    fn insert(&mut self, cloud: &Cloud, poses: &CloudPoses) -> voxtile::Result<()> {
+        let Some(mut points) = self.reader.points(cloud, poses) else { return Ok(()) };
+        let scan = points.scan(&poses.map_from_sensor, cloud.stamp_ns);
+        let inserted = scan.and_then(|scan| {
+            let report = self.mapper.insert_points(&scan)?;
+            self.reader.check_layers(&scan);
+            Ok(report)
+        });
+        match inserted {
+            Ok(report) => {
+                // Local maps have no ground: a marked point would be an obstacle there.
+                points.remove_ground();
                 // Update the local map before `note_scan`: publishers send each version once.
-                self.local.insert(&scan);
-                let (scan_number, sensor_m) = (self.mapper.scan_number(), world_from_sensor.position_m);
+                if let Ok(scan) = points.scan(&poses.map_from_sensor, cloud.stamp_ns) {
+                    self.local.insert(&scan);
+                }
+                let sensor_m = poses.map_from_sensor.position_m;
+                let scan_number = self.mapper.scan_number();
                 self.live.note_scan(scan_number, sensor_m, cloud.stamp_ns);
                 self.latencies.note(cloud.arrived.elapsed());
                 let points = report.points.saturating_sub(report.skipped.total());

@@ -93,7 +93,7 @@ mod tests {
             cdr: Vec::new(),
             points_bytes: 0,
             arrived: Instant::now(),
-            pose: None,
+            poses: None,
         };
         let (sources, max_wait) = ("/tf and /tf_static", Duration::from_millis(500));
         let (owners, stamps) = (&owners, &stamps);

@@ -1,5 +1,6 @@
 use crate::args::Args;
 use crate::cloud::Cloud;
+use crate::cloud_poses::CloudPoses;
 use crate::cloud_queue::{CloudQueue, Verdict};
 use crate::counters::Counters;
 use crate::frame_owners::FrameOwners;
@@ -21,6 +22,8 @@ pub struct TransformBuffer {
     transforms: Transforms,
     stamps: StampCheck,
     fixed_frame: String,
+    /// Frame of the ground filter.
+    base_frame: Option<String>,
     max_wait: Duration,
     /// Topics of transforms, for messages.
     sources: String,
@@ -55,6 +58,7 @@ impl TransformBuffer {
             transforms,
             stamps: StampCheck::default(),
             fixed_frame: bare(&args.frame_id).to_owned(),
+            base_frame: args.filter_ground_plane.then(|| bare(&args.base_frame_id).to_owned()),
             max_wait: args.transform_wait,
             sources: format!("{} and /tf_static", args.odometry.as_deref().unwrap_or("/tf")),
             samples: (0, 0),
@@ -159,18 +163,18 @@ impl TransformBuffer {
         }
     }
 
-    /// Returns the pose of a cloud, or whether it may still arrive.
-    pub fn verdict(&mut self, cloud: &Cloud, now: Instant) -> Verdict<RigidPose> {
+    /// Returns the poses of a cloud, or whether they may still arrive.
+    pub fn verdict(&mut self, cloud: &Cloud, now: Instant) -> Verdict<CloudPoses> {
         if !self.sensors.contains_key(bare(&cloud.frame)) && self.sensors.len() < MAX_SENSORS {
             self.sensors.insert(bare(&cloud.frame).to_owned(), None);
         }
-        let why = match cloud.pose.map_or_else(|| self.find(cloud), Ok) {
-            Ok(pose) => {
+        let why = match cloud.poses.map_or_else(|| self.find(cloud), Ok) {
+            Ok(poses) => {
                 if let Some(stamp_ns) = self.sensors.get_mut(bare(&cloud.frame)) {
                     *stamp_ns = Some(cloud.stamp_ns);
                 }
                 self.watch.note_found(cloud.topic);
-                return Verdict::Ready(pose);
+                return Verdict::Ready(poses);
             }
             Err(why) => why,
         };
@@ -219,9 +223,9 @@ impl TransformBuffer {
         log::warn!("transform refused{publisher}: {}", printable(why));
     }
 
-    /// Returns the pose of a cloud, unless the clock of one of its frames may have jumped.
-    fn find(&self, cloud: &Cloud) -> Result<RigidPose, WhyNot> {
-        let pose = self.look_up(cloud)?;
+    /// Returns the poses of a cloud, unless the clock of one of its frames may have jumped.
+    fn find(&self, cloud: &Cloud) -> Result<CloudPoses, WhyNot> {
+        let poses = self.look_up(cloud)?;
         // Transforms since then may be of a new clock that repeats the same stamps.
         let mut off = self.stamps.off().filter(|(_, since)| *since <= cloud.arrived).peekable();
         if off.peek().is_some() {
@@ -231,15 +235,18 @@ impl TransformBuffer {
                 return Err(WhyNot::After(bare(child).to_owned()));
             }
         }
-        Ok(pose)
+        Ok(poses)
     }
 
-    fn look_up(&self, cloud: &Cloud) -> Result<RigidPose, WhyNot> {
+    fn look_up(&self, cloud: &Cloud) -> Result<CloudPoses, WhyNot> {
         // Without a sensor position, the rays of a cloud in the map frame would begin at the origin.
         if bare(&cloud.frame) == self.fixed_frame {
             return Err(WhyNot::AlreadyFixed(self.fixed_frame.clone()));
         }
-        self.transforms.lookup(&self.fixed_frame, &cloud.frame, cloud.stamp_ns)
+        let pose_in = |frame: &str| self.transforms.lookup(frame, &cloud.frame, cloud.stamp_ns);
+        let map_from_sensor = pose_in(&self.fixed_frame)?;
+        let base_from_sensor = self.base_frame.as_deref().map(pose_in).transpose()?;
+        Ok(CloudPoses { map_from_sensor, base_from_sensor })
     }
 }
 
@@ -278,7 +285,7 @@ mod tests {
 
     fn cloud(stamp_ns: i64) -> Cloud {
         let (frame, cdr) = ("lidar".to_owned(), Vec::new());
-        Cloud { topic: 0, stamp_ns, frame, cdr, points_bytes: 0, arrived: Instant::now(), pose: None }
+        Cloud { topic: 0, stamp_ns, frame, cdr, points_bytes: 0, arrived: Instant::now(), poses: None }
     }
 
     #[test]
@@ -312,7 +319,7 @@ mod tests {
             &mut counters,
         );
         let Verdict::Ready(found) = buffer.verdict(&cloud, cloud.arrived) else { panic!("no pose") };
-        assert_eq!(found.position_m, [2.0, 0.0, 0.0]);
+        assert_eq!(found.map_from_sensor.position_m, [2.0, 0.0, 0.0]);
         assert_eq!(counters, Counters::default());
     }
 
@@ -333,7 +340,7 @@ mod tests {
         }
         let found =
             |buffer: &mut TransformBuffer, stamp_ns: i64| match buffer.verdict(&cloud(stamp_ns), start) {
-                Verdict::Ready(pose) => Some(pose.position_m[0]),
+                Verdict::Ready(pose) => Some(pose.map_from_sensor.position_m[0]),
                 _ => None,
             };
         assert_eq!(found(&mut buffer, 60 * S), Some(4.0));
@@ -359,7 +366,7 @@ mod tests {
             buffer.insert(&pose("map", "base", stamp_ns, 3.0), false, None, now, &mut queue(), &mut counters);
             let found = buffer.verdict(&cloud(stamp_ns), now);
             assert!(
-                matches!(found, Verdict::Ready(pose) if pose.position_m[0] == 4.0),
+                matches!(found, Verdict::Ready(pose) if pose.map_from_sensor.position_m[0] == 4.0),
                 "{number}: {found:?}"
             );
         }
@@ -414,7 +421,10 @@ mod tests {
             }
             put(&mut buffer, &pose("map", "base", S, 2.0), false, robot);
             let found = buffer.verdict(&cloud(S / 2), start);
-            assert!(matches!(found, Verdict::Ready(pose) if pose.position_m[0] == 3.0), "{found:?}");
+            assert!(
+                matches!(found, Verdict::Ready(pose) if pose.map_from_sensor.position_m[0] == 3.0),
+                "{found:?}"
+            );
             assert!(buffer.transforms.frames() <= MAX_FRAMES);
         }
     }
@@ -440,7 +450,10 @@ mod tests {
             put(&mut buffer, &pose(&format!("g{}", k + 1), &format!("g{k}"), 0, 0.0), false, flood);
         }
         let found = buffer.verdict(&cloud(S / 2), start);
-        assert!(matches!(found, Verdict::Ready(pose) if pose.position_m[0] == 3.0), "{found:?}");
+        assert!(
+            matches!(found, Verdict::Ready(pose) if pose.map_from_sensor.position_m[0] == 3.0),
+            "{found:?}"
+        );
     }
 
     #[test]
@@ -481,7 +494,7 @@ mod tests {
         for stamp_ns in [S / 100, 2 * S - S / 100, 3 * S + S / 100] {
             let found = buffer.verdict(&cloud(stamp_ns), now);
             assert!(
-                matches!(found, Verdict::Ready(pose) if pose.position_m[0] == 3.0),
+                matches!(found, Verdict::Ready(pose) if pose.map_from_sensor.position_m[0] == 3.0),
                 "{stamp_ns}: {found:?}"
             );
         }
@@ -524,7 +537,7 @@ mod tests {
                 let now = start + Duration::from_nanos(stamp_ns as u64);
                 let found = buffer.verdict(&Cloud { arrived: now, ..cloud(stamp_ns) }, now);
                 assert!(
-                    matches!(found, Verdict::Ready(pose) if pose.position_m[0] == 3.0),
+                    matches!(found, Verdict::Ready(pose) if pose.map_from_sensor.position_m[0] == 3.0),
                     "{tick}: {found:?}"
                 );
             }
@@ -581,7 +594,7 @@ mod tests {
         let mut take = || queue.take_ready(&mut Counters::default(), |cloud| buffer.verdict(cloud, now));
         let mut positions_m = Vec::new();
         while let Some((_, pose)) = take() {
-            positions_m.push(pose.position_m[0]);
+            positions_m.push(pose.map_from_sensor.position_m[0]);
         }
         assert_eq!(positions_m.len(), 2);
         assert!((positions_m[0] - 2.0).abs() + (positions_m[1] - 70.01).abs() < 1e-9, "{positions_m:?}");
@@ -607,8 +620,11 @@ mod tests {
         assert!(matches!(buffer.verdict(&before, at(301)), Verdict::Ready(_)));
         (301..400).for_each(|number| tick(&mut buffer, &mut queue, number, (number - 250) * S / 50, 9.0));
         let found = buffer.verdict(&again, at(301));
-        assert!(matches!(found, Verdict::Ready(pose) if pose.position_m[0] == 9.0), "{found:?}");
+        assert!(
+            matches!(found, Verdict::Ready(pose) if pose.map_from_sensor.position_m[0] == 9.0),
+            "{found:?}"
+        );
         let taken = queue.take_ready(&mut Counters::default(), |cloud| buffer.verdict(cloud, at(400)));
-        assert_eq!(taken.map(|(_, pose)| pose.position_m[0]), Some(1.0));
+        assert_eq!(taken.map(|(_, pose)| pose.map_from_sensor.position_m[0]), Some(1.0));
     }
 }

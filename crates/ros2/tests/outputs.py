@@ -5,6 +5,7 @@ outputs.py listen DOMAIN FILE SECONDS [TOPIC ...]   writes the last message and 
 outputs.py compare FILE ALL.csv MAP.pgm CLOUDS RADIUS MAX_Z live|rest RANGE
                                                     compares them with the output of `voxtile export`
 outputs.py whole FILE ALL.csv   compares octomap_full, of a box around the whole map
+outputs.py colours FILE OCCUPIED.csv   compares the colours of octomap_point_cloud_centers
 """
 
 import csv
@@ -68,10 +69,12 @@ def plain(name, message):
         return {"frame": frame, "type": marker.type, "action": marker.action, "scale": scale, "points": points}
     if TYPES[name][0] is PointCloud2:
         names = ["x", "y", "z", "distance"][: 4 if name == "distance_field" else 3]
-        assert [field.name for field in message.fields] == names
-        points = np.frombuffer(octets(message.data), "<f4").reshape(-1, len(names))
+        found = [field.name for field in message.fields]
+        assert found in (names, [*names, "rgb"])
+        points = np.frombuffer(octets(message.data), "<f4").reshape(-1, len(found))
         assert len(points) == message.width * message.height
-        return {"frame": message.header.frame_id, "points": points.astype(float).tolist()}
+        colours = {"colours": points[:, -1].copy().view("<u4").tolist()} if found[-1] == "rgb" else {}
+        return {"frame": message.header.frame_id, "points": points[:, : len(names)].astype(float).tolist(), **colours}
     if name == "projected_map":
         info = message.info
         origin = info.origin.position
@@ -238,9 +241,23 @@ def compare_whole(file, all_csv):
     print(f"outputs: {len(log_odds)} voxels in octomap_full")
 
 
+def compare_colours(file, occupied_csv):
+    got = json.load(open(file))["octomap_point_cloud_centers"]["message"]
+    published = {tuple(np.round(at, 3).tolist()): colour for at, colour in zip(got["points"], got["colours"])}
+    exported = {}
+    for row in csv.DictReader(open(occupied_csv)):
+        at = tuple(round(float(row[axis]), 3) for axis in "xyz")
+        red, green, blue = (int(row[name] or 255) for name in ["red", "green", "blue"])
+        exported[at] = red << 16 | green << 8 | blue
+    assert published == exported, "the colours differ"
+    print(f"outputs: {len(exported)} voxels with {len(set(exported.values()))} colours")
+
+
 def main():
     if sys.argv[1] == "whole":
         compare_whole(*sys.argv[2:4])
+    elif sys.argv[1] == "colours":
+        compare_colours(*sys.argv[2:4])
     elif sys.argv[1] == "listen":
         listen(int(sys.argv[2]), sys.argv[3], float(sys.argv[4]), sys.argv[5:])
     else:

@@ -96,6 +96,18 @@ def variant(plain, number):
     return PointCloud2(plain.header, 1, 2000, fields, False, 40, len(data), data, False)
 
 
+def attributed(plain):
+    """Returns the same points with colours, packed as in PCL, and labels, some of which are no classes."""
+    points = np.frombuffer(plain.data, "<f4").reshape(-1, 4)
+    rows = np.zeros(len(points), {"names": ["point", "rgb", "label"], "formats": ["4<f4", "<u4", "<u2"], "itemsize": 24})
+    rows["point"] = points
+    rows["rgb"] = np.nan_to_num(np.abs(points[:, :3]) * 60).astype(np.uint32) @ [1 << 16, 1 << 8, 1]
+    rows["label"] = np.where(np.isnan(points[:, 0]), 300, points[:, 3])
+    fields = [*plain.fields, PointField("rgb", 16, 7, 1), PointField("label", 20, 4, 1)]
+    data = rows.tobytes()
+    return PointCloud2(plain.header, 1, len(rows), fields, False, 24, len(data), data, False)
+
+
 def real_messages(clouds, folder):
     """Yields the messages of a recording: each cloud with the pose at its stamp."""
     poses = [line.split() for line in open(folder / "poses_tum.txt") if not line.startswith("#")]
@@ -140,7 +152,8 @@ def messages(clouds, kind, folder):
         if tick % 5 == 0 and tick // 5 < clouds:
             plain = cloud(stamp_ns + 7_000_000, tick)
             plain.header.frame_id = "base" if kind == "rclpy" else "lidar"
-            yield "/cloud_in", variant(plain, tick // 5) if kind == "variants" else plain
+            changed = {"variants": lambda: variant(plain, tick // 5), "layers": lambda: attributed(plain)}
+            yield "/cloud_in", changed.get(kind, lambda: plain)()
 
 
 TYPES = {

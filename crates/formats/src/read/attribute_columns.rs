@@ -130,7 +130,7 @@ enum ColourScale {
 
 /// Converts values to colours and classes, and counts those that are none.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct AttributeValues {
+pub struct AttributeValues {
     scale: Option<ColourScale>,
     is_guessed: bool,
     /// Number of points with a colour outside of the scale.
@@ -209,7 +209,7 @@ impl AttributeValues {
     }
 
     /// Returns remarks for the user about the values so far.
-    pub(crate) fn remarks(&self) -> Vec<String> {
+    pub fn remarks(&self) -> Vec<String> {
         let scale = match self.scale.filter(|_| self.is_guessed) {
             Some(ColourScale::Fractions) => Some("0 to 1"),
             Some(_) => Some("0 to 255"),

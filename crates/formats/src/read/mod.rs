@@ -89,6 +89,7 @@ mod wkt;
 #[cfg(feature = "e57")]
 mod xml_check;
 
+pub use attribute_columns::AttributeValues;
 pub use cloud::{CloudHead, CloudPoint, CloudSource, PoseAt};
 pub use input_file::open_input;
 pub use intrinsics::Intrinsics;

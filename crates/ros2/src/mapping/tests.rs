@@ -6,6 +6,7 @@ use testkit::faulty_disk::{Fault, FaultyDisk};
 use voxtile::MapPath;
 use voxtile::SensorModel;
 use voxtile::query::Queries;
+use voxtile_formats::RigidPose;
 
 /// Sensor position; `FAR` is in another tile.
 const NEAR: [f64; 3] = [0.05; 3];
@@ -31,13 +32,17 @@ fn cloud(points_m: Vec<[f64; 3]>) -> Cloud {
     let frame = "lidar".to_owned();
     let header = messages::Header { frame_id: frame.clone(), ..messages::Header::default() };
     let cdr = messages::PointCloud2::of_points(header, points_m).cdr();
-    Cloud { topic: 0, stamp_ns: 0, frame, cdr, points_bytes: 0, arrived: Instant::now(), pose: None }
+    Cloud { topic: 0, stamp_ns: 0, frame, cdr, points_bytes: 0, arrived: Instant::now(), poses: None }
+}
+
+fn at(sensor_m: Point) -> CloudPoses {
+    let map_from_sensor = RigidPose { position_m: sensor_m, ..RigidPose::IDENTITY };
+    CloudPoses { map_from_sensor, base_from_sensor: None }
 }
 
 impl Mapping {
     fn map(&mut self, sensor_m: Point) {
-        let pose = RigidPose { position_m: sensor_m, quaternion: [0.0, 0.0, 0.0, 1.0] };
-        self.insert(&cloud(vec![[2.0, 0.0, 0.0]]), &pose).unwrap();
+        self.insert(&cloud(vec![[2.0, 0.0, 0.0]]), &at(sensor_m)).unwrap();
     }
 
     /// Waits for the running flush and processes its result.
@@ -152,8 +157,7 @@ fn a_map_at_its_memory_limit_does_not_count_clouds_as_malformed() {
     let (mut mapping, _) = open(folder.path(), &["--tile-size", "0.2", "--memory", "20MiB"]);
     // Each ray crosses hundreds of these small tiles.
     let around = |k: u32| [60.0 * f64::from(k).cos(), 60.0 * f64::from(k).sin(), 0.1 * f64::from(k)];
-    let pose = RigidPose { position_m: NEAR, quaternion: [0.0, 0.0, 0.0, 1.0] };
-    mapping.insert(&cloud((0..600).map(around).collect()), &pose).unwrap();
+    mapping.insert(&cloud((0..600).map(around).collect()), &at(NEAR)).unwrap();
     mapping.map(NEAR);
     let (counters, _) = mapping.inbox.counters();
     assert_eq!((counters.refused_memory, counters.malformed, counters.mapped), (1, 0, 1));
@@ -196,9 +200,8 @@ fn a_waiting_path_is_dropped_by_a_revert() {
 fn points_outside_of_the_limits_are_neither_hits_nor_free() {
     let folder = tempfile::tempdir().unwrap();
     let (mut mapping, _) = open(folder.path(), &["--point-cloud-min-z", "-0.5", "--point-cloud-max-x", "3"]);
-    let pose = RigidPose { position_m: NEAR, quaternion: [0.0, 0.0, 0.0, 1.0] };
     // Only the first point is inside.
-    mapping.insert(&cloud(vec![[2.0, 0.0, 0.0], [0.0, 2.0, -1.0], [4.0, 0.5, 0.0]]), &pose).unwrap();
+    mapping.insert(&cloud(vec![[2.0, 0.0, 0.0], [0.0, 2.0, -1.0], [4.0, 0.5, 0.0]]), &at(NEAR)).unwrap();
     let counters = mapping.inbox.counters().0;
     assert_eq!((counters.mapped, counters.points), (1, 1));
     let known = |map: &Mapping, point_m| map.mapper.occupancy_at(point_m).unwrap();
@@ -254,4 +257,64 @@ fn a_wrong_octomap_file_creates_no_map() {
         error(&["--keep-scans"]).unwrap().contains("--octomap-path cannot be combined with --keep-scans")
     );
     assert!(!map.exists());
+}
+
+fn coloured_cloud(stamp_ns: i64) -> Cloud {
+    let header = messages::Header { frame_id: "lidar".to_owned(), ..messages::Header::default() };
+    let points = [([2.0, 0.0, 0.0], [10, 20, 30]), ([2.01, 0.01, 0.0], [30, 40, 50])];
+    Cloud { cdr: messages::PointCloud2::of_colours(header, points).cdr(), stamp_ns, ..cloud(Vec::new()) }
+}
+
+#[test]
+fn colours_and_stamps_reach_the_layers_of_a_new_map_which_keeps_them() {
+    use voxtile::MapQueries;
+    let folder = tempfile::tempdir().unwrap();
+    let layers_at = |mapping: &Mapping| mapping.mapper.layers_at([2.05, 0.05, 0.05]).unwrap();
+    let (mut mapping, _) = open(folder.path(), &["--layers", "colour,time"]);
+    mapping.insert(&coloured_cloud(7), &at(NEAR)).unwrap();
+    let layers = layers_at(&mapping).unwrap();
+    assert_eq!((layers.points, layers.mean_colour()), (2, Some([20, 30, 40])));
+    assert_eq!(layers.time.map(|time| (time.first_ns, time.last_ns)), Some((7, 7)));
+    mapping.mapper.flush().unwrap();
+    drop(mapping);
+    // Another request is ignored with a warning.
+    for options in [&[][..], &["--layers", "shape"]] {
+        let (mut mapping, _) = open(folder.path(), options);
+        mapping.insert(&coloured_cloud(9), &at(NEAR)).unwrap();
+        let layers = layers_at(&mapping).unwrap();
+        assert_eq!((layers.points, layers.colour.points), (4, 4));
+        assert_eq!(mapping.mapper.config().layers().to_string(), "colour, time");
+    }
+    let other = tempfile::tempdir().unwrap();
+    let (mut mapping, _) = open(other.path(), &[]);
+    mapping.insert(&coloured_cloud(7), &at(NEAR)).unwrap();
+    assert_eq!(layers_at(&mapping), None);
+}
+
+#[test]
+fn the_ground_is_free_up_to_its_points_and_obstacles_on_it_are_occupied() {
+    let folder = tempfile::tempdir().unwrap();
+    let options = ["--filter-ground-plane", "--point-cloud-max-z", "1.5"];
+    let (mut mapping, _) = open(folder.path(), &options);
+    // The sensor is 1 m above the base, which is 3 m above the origin of the map.
+    let map_from_sensor = RigidPose { position_m: [0.05, 0.05, 4.05], ..RigidPose::IDENTITY };
+    let base_from_sensor = Some(RigidPose { position_m: [0.0, 0.0, 1.0], ..RigidPose::IDENTITY });
+    let mut points: Vec<[f64; 3]> = Vec::new();
+    for k in 0..400 {
+        points.push([1.0 + 0.1 * f64::from(k % 20), -1.0 + 0.1 * f64::from(k / 20), -1.0]);
+    }
+    // A box on the ground, and a point above the limit, which is in the base frame.
+    points.extend([[2.0, 0.0, -0.7], [2.0, 0.0, 0.9]]);
+    mapping.insert(&cloud(points), &CloudPoses { map_from_sensor, base_from_sensor }).unwrap();
+    assert_eq!(mapping.inbox.counters().0.points, 401);
+    let state = |point_m| mapping.mapper.occupancy_at(point_m).unwrap();
+    assert!(state([2.05, 0.05, 3.35]).is_occupied());
+    let (mut occupied, mut free) = (0, 0);
+    for k in 0..400 {
+        let ground_m = [1.05 + 0.1 * f64::from(k % 20), -0.95 + 0.1 * f64::from(k / 20), 3.05];
+        occupied += usize::from(state(ground_m).is_occupied());
+        free += usize::from(state([ground_m[0], ground_m[1], 3.15]).is_free());
+    }
+    assert_eq!(occupied, 0);
+    assert!(free > 200, "{free}");
 }

@@ -27,7 +27,7 @@ pub struct Marker {
     frame_locked: bool,
     /// Metres.
     pub points: Vec<[f64; 3]>,
-    colors: Vec<Color>,
+    pub colors: Vec<Color>,
     texture_resource: String,
     texture: CompressedImage,
     uv_coordinates: Vec<[f32; 2]>,
@@ -63,6 +63,14 @@ pub struct MarkerArray {
 const CUBE_LIST: i32 = 6;
 const ADD: i32 = 0;
 const DELETE: i32 = 2;
+
+impl Color {
+    /// Returns an opaque color.
+    pub fn of_bytes(colour: [u8; 3]) -> Self {
+        let [r, g, b] = colour.map(|value| f32::from(value) / 255.0);
+        Self { r, g, b, a: 1.0 }
+    }
+}
 
 impl Marker {
     /// Returns cubes of one size and color. Without cubes, the marker deletes the previous ones.

@@ -31,7 +31,7 @@ const UINT8: u8 = 2;
 const STEP: u32 = 12;
 /// Bytes per point of clouds with the field `state`, padded to alignment.
 const STEP_WITH_STATE: u32 = 16;
-/// Bytes per point of clouds with a further number.
+/// Bytes per point of clouds with a further number or a colour.
 const STEP_WITH_VALUE: u32 = 16;
 
 impl PointCloud2 {
@@ -42,6 +42,18 @@ impl PointCloud2 {
         Self::of_data(header, position_fields().to_vec(), STEP, data)
     }
 
+    /// Returns a cloud with an additional field `rgb`, packed as in PCL.
+    pub fn of_colours(header: Header, points: impl IntoIterator<Item = ([f64; 3], [u8; 3])>) -> Self {
+        let mut data = Vec::new();
+        for (point_m, colour) in points {
+            data.extend(point_m.into_iter().flat_map(|value| (value as f32).to_le_bytes()));
+            data.extend(packed(colour));
+        }
+        let mut fields = position_fields().to_vec();
+        fields.push(rgb_field(STEP));
+        Self::of_data(header, fields, STEP_WITH_VALUE, data)
+    }
+
     /// Returns a cloud with an additional field `state`.
     pub fn of_states(header: Header, points: impl IntoIterator<Item = ([f64; 3], u8)>) -> Self {
         let mut data = Vec::new();
@@ -49,9 +61,23 @@ impl PointCloud2 {
             data.extend(point_m.into_iter().flat_map(|value| (value as f32).to_le_bytes()));
             data.extend([state, 0, 0, 0]);
         }
-        let mut fields = position_fields().to_vec();
-        fields.push(PointField { name: "state".to_owned(), offset: STEP, datatype: UINT8, count: 1 });
-        Self::of_data(header, fields, STEP_WITH_STATE, data)
+        Self::of_data(header, state_fields(), STEP_WITH_STATE, data)
+    }
+
+    /// Returns a cloud with the additional fields `state` and `rgb`.
+    pub fn of_coloured_states(
+        header: Header,
+        points: impl IntoIterator<Item = ([f64; 3], u8, [u8; 3])>,
+    ) -> Self {
+        let mut data = Vec::new();
+        for (point_m, state, colour) in points {
+            data.extend(point_m.into_iter().flat_map(|value| (value as f32).to_le_bytes()));
+            data.extend([state, 0, 0, 0]);
+            data.extend(packed(colour));
+        }
+        let mut fields = state_fields();
+        fields.push(rgb_field(STEP_WITH_STATE));
+        Self::of_data(header, fields, STEP_WITH_STATE + 4, data)
     }
 
     /// Returns a cloud with an additional field in single precision.
@@ -93,6 +119,21 @@ impl PointCloud2 {
             is_dense: true,
         }
     }
+}
+
+fn state_fields() -> Vec<PointField> {
+    let mut fields = position_fields().to_vec();
+    fields.push(PointField { name: "state".to_owned(), offset: STEP, datatype: UINT8, count: 1 });
+    fields
+}
+
+fn rgb_field(offset: u32) -> PointField {
+    PointField { name: "rgb".to_owned(), offset, datatype: FLOAT32, count: 1 }
+}
+
+/// Blue, green, red and 0: the bits of a little-endian `float`, as in PCL.
+fn packed([red, green, blue]: [u8; 3]) -> [u8; 4] {
+    [blue, green, red, 0]
 }
 
 fn position_fields() -> [PointField; 3] {

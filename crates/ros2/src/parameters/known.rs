@@ -2,13 +2,18 @@ use crate::args::Args;
 use clap::CommandFactory as _;
 
 /// Parameter names of octomap_server and the corresponding fields.
-const ALIASES: [(&str, &str); 6] = [
+const ALIASES: [(&str, &str); 10] = [
     ("sensor_model.max_range", "max_range"),
     ("sensor_model.min_range", "min_range"),
     ("sensor_model.hit", "hit"),
     ("sensor_model.miss", "miss"),
     ("sensor_model.min", "clamp_min"),
     ("sensor_model.max", "clamp_max"),
+    ("ground_filter.distance", "ground_filter_distance"),
+    ("ground_filter.angle", "ground_filter_angle"),
+    ("ground_filter.plane_distance", "ground_filter_plane_distance"),
+    // `true` is the layer colour, see `parse`.
+    ("colored_map", "layers"),
 ];
 
 /// Fields that only the command line may set.
@@ -44,10 +49,12 @@ mod tests {
             ("point_cloud_min_z", "point_cloud_min_z"),
             ("sensor_model.max", "clamp_max"),
             ("network", "network"),
+            ("filter_ground_plane", "filter_ground_plane"),
+            ("ground_filter.angle", "ground_filter_angle"),
         ] {
             assert_eq!(field_of(name).as_deref(), Some(field));
         }
-        for unknown in ["", "help", "params_file", "filter_ground_plane", "sensor_model.hits"] {
+        for unknown in ["", "help", "params_file", "ground_filter", "sensor_model.hits"] {
             assert_eq!(field_of(unknown), None, "{unknown}");
         }
         for name in names() {

@@ -7,8 +7,6 @@ pub enum Effect {
     None,
     /// The map is the same; topics differ as the text says.
     Topics(&'static str),
-    /// The map would differ from that of octomap_server.
-    Refused(&'static str),
 }
 
 /// Values of parameters that have the same effect in both programs.
@@ -34,24 +32,12 @@ impl Same {
 
 /// Parameters of octomap_server 2 (Humble, Jazzy) and of rclcpp, the values that need no remark, and the effect of the
 /// others. A name is that of a parameter or of a group.
-const PARAMETERS: [(&str, Same, Effect); 20] = [
-    // Read by the ground filter alone.
-    ("base_frame_id", Same::Any, Effect::None),
-    ("ground_filter", Same::Any, Effect::None),
-    (
-        "filter_ground_plane",
-        Same::False,
-        Effect::Refused(
-            "this node has no ground filter, so the map would contain the ground. Remove the points of the ground with \
-             point_cloud_min_z, or set it to false and omit the ground in the topics with occupancy_min_z",
-        ),
-    ),
+const PARAMETERS: [(&str, Same, Effect); 16] = [
     ("filter_speckles", Same::False, Effect::Topics("single occupied voxels are published")),
     ("publish_free_space", Same::False, Effect::Topics("free_cells_vis_array is not published")),
     ("max_depth", Same::FullDepth, Effect::Topics("topics have the full resolution")),
     ("min_x_size", Same::Zero, Effect::Topics("projected_radius sets the size of projected_map")),
     ("min_y_size", Same::Zero, Effect::Topics("projected_radius sets the size of projected_map")),
-    ("colored_map", Same::False, Effect::Topics("voxels have no colors")),
     ("use_height_map", Same::Any, Effect::None),
     ("height_map", Same::Any, Effect::None),
     ("color_factor", Same::Any, Effect::None),
@@ -80,14 +66,11 @@ mod tests {
     use super::*;
 
     #[test]
-    fn only_values_that_change_the_map_are_refused() {
+    fn values_that_change_topics_have_a_remark() {
         let effect = |name, value| effect_of(name, &value);
-        assert_eq!(effect("filter_ground_plane", Value::Bool(false)), Some(Effect::None));
-        let refused = effect("filter_ground_plane", Value::Bool(true));
-        assert!(matches!(refused, Some(Effect::Refused(why)) if why.contains("point_cloud_min_z")));
+        assert_eq!(effect("filter_speckles", Value::Bool(false)), Some(Effect::None));
         // A value of the wrong type could be meant as true.
-        assert!(matches!(effect("filter_ground_plane", Value::Text("yes".into())), Some(Effect::Refused(_))));
-        assert_eq!(effect("ground_filter.distance", Value::Number(0.04)), Some(Effect::None));
+        assert!(matches!(effect("filter_speckles", Value::Text("yes".into())), Some(Effect::Topics(_))));
         assert_eq!(effect("color.r", Value::Whole(1)), Some(Effect::None));
         assert_eq!(effect("max_depth", Value::Whole(16)), Some(Effect::None));
         assert!(matches!(effect("max_depth", Value::Whole(14)), Some(Effect::Topics(_))));

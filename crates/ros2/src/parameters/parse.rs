@@ -98,7 +98,6 @@ impl AllGiven {
                 Some(Effect::Topics(what)) => {
                     self.remarks.push(Remark::warning(format!("{source} has no effect: {what}")));
                 }
-                Some(Effect::Refused(why)) => return Err(wrong(format!("{source} is {value}: {why}"))),
                 None => {
                     let names = known::names().join(", ");
                     return Err(wrong(format!("{source} is unknown; known parameters: {names}")));
@@ -112,7 +111,12 @@ impl AllGiven {
             ("octomap_path", Value::Text(path)) => path.is_empty(),
             _ => false,
         };
-        let value = if is_none { Value::Nothing } else { value };
+        let value = match (name, value) {
+            _ if is_none => Value::Nothing,
+            ("colored_map", Value::Bool(true)) => Value::Text("colour".to_owned()),
+            ("colored_map", Value::Bool(false)) => Value::Nothing,
+            (_, value) => value,
+        };
         self.fields.insert(field, Given { value, source });
         Ok(())
     }
@@ -318,10 +322,7 @@ mod tests {
         // One remark lists all parameters without effect, one names the section.
         let [section, effects] = *of_level(log::Level::Info) else { panic!("{remarks:?}") };
         assert!(section.contains("/octomap_server is used for /voxtile_ros2"), "{section}");
-        assert!(
-            effects.contains("base_frame_id, color.a, ") && effects.contains("ground_filter.angle"),
-            "{effects}"
-        );
+        assert!(effects.contains("color.a, ") && !effects.contains("ground_filter"), "{effects}");
         let warnings = of_level(log::Level::Warn);
         assert!(
             warnings.len() == 4 && warnings.iter().all(|text| text.contains("qos_overrides")),
@@ -330,13 +331,17 @@ mod tests {
     }
 
     #[test]
-    fn parameters_that_would_change_the_map_are_refused_with_their_line() {
+    fn parameters_that_change_the_map_have_an_effect_or_an_error_with_their_line() {
         let changed = |from: &str, to: &str| parsed(&OCTOMAP_SERVER.replace(from, to), &["-o", "m"]);
-        let error = changed("filter_ground_plane: false", "filter_ground_plane: true").unwrap_err();
-        assert!(
-            error.contains("p.yaml:9: parameter filter_ground_plane is true: this node has no ground"),
-            "{error}"
-        );
+        let filter = changed("filter_ground_plane: false", "filter_ground_plane: true").unwrap();
+        assert_eq!(filter.base_frame_id, "base_footprint");
+        let filter = filter.ground_filter().unwrap().unwrap();
+        assert_eq!((filter.distance_m, filter.angle_rad, filter.plane_distance_m), (0.04, 0.15, 0.07));
+        let error = changed("filter_ground_plane: false", "filter_ground_plane: some").unwrap_err();
+        assert!(error.contains("p.yaml:9: parameter filter_ground_plane: invalid type"), "{error}");
+        let coloured = changed("colored_map: false", "colored_map: true").unwrap();
+        assert_eq!(coloured.layers, Some("colour".parse().unwrap()));
+        assert_eq!(changed("colored_map: false", "colored_map: false").unwrap().layers, None);
         let error = changed("hit: 0.8", "hit: high").unwrap_err();
         assert!(error.contains("p.yaml:32: parameter sensor_model.hit: invalid type: string"), "{error}");
         let error = changed("latch:", "latched:").unwrap_err();

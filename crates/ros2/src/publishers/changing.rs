@@ -1,3 +1,4 @@
+use super::occupied_voxels::{OccupiedVoxel, changes_cloud};
 use super::outlet::is_expired;
 use super::viewers::Viewers;
 use crate::live_map::MapVersion;
@@ -34,7 +35,8 @@ impl Changing {
         grid: &Grid,
         region: &Aabb,
         header: Header,
-        occupied: impl FnOnce() -> anyhow::Result<Vec<VoxelIndex>>,
+        has_colours: bool,
+        occupied: impl FnOnce() -> anyhow::Result<Vec<OccupiedVoxel>>,
     ) {
         if !self.viewers.needs_update(self.sender.subscribers(), version, Instant::now()) {
             return;
@@ -53,14 +55,15 @@ impl Changing {
             }
         };
         occupied.sort_unstable();
-        let changes = self.viewers.changes(&occupied, |voxel| region.contains(grid.center_m(voxel)));
+        let voxels: Vec<VoxelIndex> = occupied.iter().map(|of| of.voxel).collect();
+        let changes = self.viewers.changes(&voxels, |voxel| region.contains(grid.center_m(voxel)));
         if !changes.is_empty() || self.viewers.is_whole_due() {
-            let points = changes.into_iter().map(|(voxel, state)| (grid.center_m(voxel), state as u8));
-            if let Err(error) = self.sender.send(PointCloud2::of_states(header, points)) {
+            let cloud = changes_cloud(grid, &changes, &occupied, has_colours, header);
+            if let Err(error) = self.sender.send(cloud) {
                 log::debug!("{}: not sent, will retry: {error}", self.topic);
                 return;
             }
         }
-        self.viewers.note_sent(version, occupied, Instant::now());
+        self.viewers.note_sent(version, voxels, Instant::now());
     }
 }

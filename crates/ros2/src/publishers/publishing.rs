@@ -101,7 +101,7 @@ impl Publishing {
         self.centers.refresh(version, || cloud(&map.view(), &around, extent, header()));
         self.markers.refresh(version, || markers(&map.view(), &around, extent, header()));
         let occupied = || occupied_voxels(&map.view(), &around, extent);
-        self.changing.refresh(version, map.grid(), &around, header(), occupied);
+        self.changing.refresh(version, map.grid(), &around, header(), map.layers().colour, occupied);
         let is_wanted = self.local_occupied.is_wanted() || self.local_inflated.is_wanted();
         map.local().set_wanted(is_wanted);
         if let Some(view) = map.local().view() {

@@ -135,7 +135,7 @@ impl<'a> PointCloud2<'a> {
     }
 
     /// Sets the attributes to read. `values` are those of the previous message.
-    pub(crate) fn read_attributes(&mut self, wanted: AttributeSet, values: AttributeValues) {
+    pub fn read_attributes(&mut self, wanted: AttributeSet, values: AttributeValues) {
         let column = |at: usize| column_of(self.fields.get(at)?, self.point_bytes);
         // Fields outside of a point are not there.
         let names = (0..self.fields.len()).map(|at| column(at).and_then(|_| self.fields.get(at)));
@@ -149,12 +149,12 @@ impl<'a> PointCloud2<'a> {
     }
 
     /// Returns which of the attributes to read the points have.
-    pub(crate) fn attributes(&self) -> AttributeSet {
+    pub fn attributes(&self) -> AttributeSet {
         self.attributes.set()
     }
 
     /// Returns the converter of attributes, with its counts.
-    pub(crate) fn into_values(self) -> AttributeValues {
+    pub fn into_values(self) -> AttributeValues {
         self.values.into_inner()
     }
 
