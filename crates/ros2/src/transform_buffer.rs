@@ -11,7 +11,6 @@ use crate::stamp_check::{StampCheck, StampVerdict};
 use crate::transport::Gid;
 use std::collections::{HashMap, HashSet};
 use std::time::{Duration, Instant};
-use voxtile_formats::RigidPose;
 use voxtile_formats::poses::most_gap_ns;
 use voxtile_formats::ros::messages::StampedPose;
 use voxtile_formats::ros::{BadTransform, Transforms, WhyNot};
@@ -265,6 +264,7 @@ mod tests {
     use super::*;
     use crate::when_behind::WhenBehind;
     use clap::Parser;
+    use voxtile_formats::RigidPose;
     use voxtile_formats::ros::messages::Header;
 
     fn buffer() -> TransformBuffer {
