@@ -67,7 +67,7 @@ fn maps_of_octomap_are_read_to_the_last_node_and_written_back_to_the_byte() {
         assert_eq!(file.tree.leaf_count(), file.tree.leaves().count() as u64);
         let again = match file.format {
             OctreeFormat::Bt => written_bt(&file.tree, file.resolution_m),
-            OctreeFormat::Ot => written_ot(&file.tree, file.resolution_m),
+            OctreeFormat::Ot | OctreeFormat::ColorOt => written_ot(&file.tree, file.resolution_m),
         };
         assert!(again == bytes, "{}: not the same bytes", path.display());
     }

@@ -20,7 +20,7 @@ fn whole(map: &impl MapQueries, format: OctreeFormat, region: Option<&Aabb>) -> 
     let resolution_m = config.grid.resolution_m();
     match format {
         OctreeFormat::Bt => write_bt(&tree, resolution_m, config.occupied_log_odds() as f32, &mut bytes),
-        OctreeFormat::Ot => write_ot(&tree, resolution_m, &mut bytes),
+        _ => write_ot(&tree, resolution_m, &mut bytes),
     }
     .unwrap();
     bytes
@@ -235,7 +235,7 @@ fn in_blocks(voxels: &BTreeMap<MortonCode, f32>, format: OctreeFormat, seed: u64
         let (mut bytes, mut spool) = (Vec::new(), Cursor::new(Vec::new()));
         let mut stream = match format {
             OctreeFormat::Bt => OctreeStream::bt(0.0, pruning, &mut spool),
-            OctreeFormat::Ot => OctreeStream::ot(&mut spool),
+            _ => OctreeStream::ot(&mut spool),
         };
         add_blocks(&mut stream, voxels, MortonCode(0), 0, &mut Random(seed));
         match stream.finish(0.05, &mut bytes).unwrap() {

@@ -23,7 +23,7 @@ from plyfile import PlyData, PlyElement
 
 try:
     import pyarrow.parquet
-except ImportError:
+except ImportError:  # large, so not part of short runs
     pyarrow = None
 
 # Offsets in a voxel are whole multiples of a 2048th, so that single precision stores every point exactly.
@@ -111,7 +111,9 @@ class Map:
         assert len(self.occupied) > 2000 and len(self.rows) > 10_000
 
     def run(self, *words):
-        subprocess.run([str(word) for word in (self.program, *words)], check=True, stdout=subprocess.DEVNULL)
+        done = subprocess.run([str(word) for word in (self.program, *words)], capture_output=True, text=True)
+        if done.returncode != 0:
+            raise RuntimeError(done.stderr.strip())
 
     def export(self, file, *options):
         path = self.folder / file
@@ -324,17 +326,18 @@ def mean_points(map):
 
 def main():
     map, program = Map(sys.argv[1], Path(sys.argv[2])), sys.argv[3]
-    checks = [csv_table, ply, npz, las, e57, mcap, geotiff, glb, mean_points]
+    checks = [csv_table, ply, npz, las, e57, mcap, geotiff, glb, mean_points] + ([parquet] if pyarrow else [])
     checks = [(check.__name__, check) for check in checks]
     checks += [("copc", lambda map: las(map, "a.copc.laz")), ("glb quantized", lambda map: glb(map, "--quantize"))]
     checks += [("ot", lambda map: ot(map, program))]
-    if pyarrow and "--parquet" in sys.argv:
-        checks += [("parquet", parquet)]
     failed = False
     for label, check in checks:
         try:
             print(f"ok      layers, {label}: {check(map)}", flush=True)
         except Exception as error:  # continue with the other formats
+            if "this build does not support it" in str(error):
+                print(f"skipped layers, {label}: {error}", flush=True)
+                continue
             failed = True
             print(f"FAILED  layers, {label}: {type(error).__name__}: {error}", flush=True)
     sys.exit(failed)

@@ -1,13 +1,14 @@
 #!/bin/sh
 # Reads the output of `voxtile export` with other programs: PCL, plyfile, pypcd4 and OctoMap, and without --short also
-# Open3D and CloudCompare. Every point must be read back in its voxel, near the origin and far from it (UTM, ECEF).
+# Open3D and CloudCompare. Every point must be read back in its voxel, near the origin and far from it (UTM, ECEF). Of a
+# map with layers, colours and other values of all formats must be those of the points (layers.py).
 #
 #   tools/interchange/run.sh [--short]
 #
 # Needs python3 with venv, and from Debian: g++, libeigen3-dev, libboost-dev, libpcl-io (the library only; PCL's headers
 # are unpacked to a temporary folder, as libpcl-dev needs a gigabyte), liboctomap-dev; without --short also cloudcompare
-# and python3-open3d. Installs only plyfile and pypcd4, into a temporary folder. VOXTILE_BIN is a folder of built
-# programs. Exits with 1 if a comparison fails.
+# and python3-open3d. Installs Python packages into a temporary folder. VOXTILE_BIN is a folder of built programs. Exits
+# with 1 if a comparison fails.
 set -eu
 cd "$(dirname "$0")/../.."
 here=tools/interchange
@@ -19,7 +20,10 @@ trap 'rm -rf "$work"' EXIT
 voxtile=${VOXTILE_BIN:-$target/release}/voxtile
 
 python3 -m venv "$work/venv"
-"$work/venv/bin/pip" install --quiet --disable-pip-version-check plyfile pypcd4
+packages="plyfile pypcd4 laspy[lazrs] pye57 rasterio trimesh mcap mcap-ros2-support"
+[ "${1-}" = --short ] || packages="$packages pyarrow"
+# shellcheck disable=SC2086
+"$work/venv/bin/pip" install --quiet --disable-pip-version-check --no-compile $packages
 python=$work/venv/bin/python
 
 # The package manager may download as another user, who must be able to write there.
@@ -30,7 +34,9 @@ library() { # name without its version
 }
 g++ -std=c++17 -O1 -w -I "$(ls -d "$work"/pcl/usr/include/pcl-*)" -I /usr/include/eigen3 "$here/pcl_reader.cpp" \
     -o "$work/pcl_reader" "$(library libpcl_io)" "$(library libpcl_common)"
-g++ -std=c++17 -O1 -w "$here/octomap_reader.cpp" -o "$work/octomap_reader" -loctomap -loctomath
+for program in octomap_reader color_octree; do
+    g++ -std=c++17 -O1 -w "$here/$program.cpp" -o "$work/$program" -loctomap -loctomath
+done
 
 failed=0
 resolution=0.2
@@ -88,4 +94,5 @@ for map in near utm ecef; do
     compare "$table" "$work/$map.ply" CloudCompare <"$work/read.asc"
     rm "$work/read.asc"
 done
+"$python" "$here/layers.py" "$voxtile" "$work/layers" "$work/color_octree" || failed=1
 exit $failed
