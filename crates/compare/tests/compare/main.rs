@@ -1,5 +1,6 @@
 //! Tests of comparisons and frontiers.
 
+mod epochs;
 mod exact;
 mod frontiers;
 mod naive;
