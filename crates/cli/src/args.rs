@@ -2,6 +2,7 @@
 mod bucket;
 mod build;
 mod clean;
+mod compare;
 mod distance;
 mod edit;
 mod export;
@@ -22,6 +23,7 @@ pub use build::{
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use clap_complete::Shell;
 pub use clean::CleanArgs;
+pub use compare::{CompareArgs, CoverageArgs};
 pub use distance::DistanceArgs;
 pub use edit::{ClearArgs, CropArgs, DecayArgs, MergeArgs};
 pub use export::{ExportArgs, WhatName};
@@ -107,6 +109,10 @@ pub enum Command {
     Snapshots(SnapshotsArgs),
     /// Compare two maps, or two snapshots of a map
     Diff(DiffArgs),
+    /// List the things that vanished or appeared between two maps, and what only one of them has seen
+    Compare(CompareArgs),
+    /// List the frontiers of a map: free voxels next to unknown ones
+    Coverage(CoverageArgs),
     /// Restore a map to a snapshot, in place
     Revert(RevertArgs),
     /// Merge several maps into a new one, without their snapshots and kept scans
@@ -183,6 +189,8 @@ impl Command {
             Self::Snapshot(args) => args.json,
             Self::Snapshots(args) => args.json,
             Self::Diff(args) => args.json,
+            Self::Compare(args) => args.json,
+            Self::Coverage(args) => args.json,
             Self::Revert(args) => args.json,
             Self::Merge(args) => args.json,
             Self::Crop(args) => args.json,

@@ -62,6 +62,10 @@ impl Progress {
         Self::styled(ProgressBar::new(tiles as u64), "{bar:30} {pos}/{len} tiles  {eta} left")
     }
 
+    pub fn over_blocks() -> Self {
+        Self::styled(ProgressBar::new(0), "{bar:30} {pos}/{len} blocks  {eta} left")
+    }
+
     pub fn over_bytes() -> Self {
         Self::styled(ProgressBar::new(0), "{bar:30} {bytes}/{total_bytes}  {bytes_per_sec}  {eta} left")
     }

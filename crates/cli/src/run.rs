@@ -5,9 +5,9 @@ use super::failure::JsonTo;
 #[cfg(feature = "view")]
 use super::view;
 use super::{
-    build, clean, clear, completions, convert, crop, decay, demo, diff, digest, distance, export, import,
-    info, local, logging, man, merge, option_names, picture, query, quiet, raycast, remap, remove_points,
-    remove_scans, repair, report, revert, scans, share, snapshot, snapshots, threads, verify,
+    build, clean, clear, compare, completions, convert, coverage, crop, decay, demo, diff, digest, distance,
+    export, import, info, local, logging, man, merge, option_names, picture, query, quiet, raycast, remap,
+    remove_points, remove_scans, repair, report, revert, scans, share, snapshot, snapshots, threads, verify,
 };
 #[cfg(feature = "bucket")]
 use super::{pull, push};
@@ -64,6 +64,8 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
         Command::Snapshot(args) => snapshot::run(&args),
         Command::Snapshots(args) => snapshots::run(&args),
         Command::Diff(args) => diff::run(&args),
+        Command::Compare(args) => compare::run(&args),
+        Command::Coverage(args) => coverage::run(&args),
         Command::Revert(args) => revert::run(&args),
         Command::Merge(args) => merge::run(&args),
         Command::Crop(args) => crop::run(&args),
@@ -149,6 +151,8 @@ fn is_parallel(command: &Command) -> bool {
         | Command::RemoveScans(_)
         | Command::RemovePoints(_)
         | Command::Clean(_)
+        | Command::Compare(_)
+        | Command::Coverage(_)
         | Command::Local(_)
         | Command::Demo(_)
         | Command::Distance(_)

@@ -8,6 +8,7 @@
 //!   -> a mapper -> Summary                                          summary
 //! ExportOptions -> export -> ExportSummary                          export/, output/
 //! write_distances_npz, write_distances_png                          distance_files
+//! Comparison of two maps -> lists, files of voxels, warnings        changes/
 //! read_moving_points: marked points of kept scans                    moving_points
 //! numbers: lists of numbers used by all front ends                  numbers
 //! PolygonFile: an area of GeoJSON                                   polygon_file
@@ -18,6 +19,7 @@ mod answer;
 mod build;
 mod build_config;
 mod build_options;
+mod changes;
 mod distance_files;
 mod export;
 mod failed_flush;
@@ -49,6 +51,10 @@ mod watch;
 pub use answer::{Answer, LayersAnswer, answer_at};
 pub use build::build;
 pub use build_options::{BuildOptions, SensorModelKind};
+pub use changes::{
+    ListFormat, WhichChanges, changes_format, check_crs, class_code, warnings_of, write_change_list,
+    write_changed_voxels,
+};
 pub use distance_files::{layer_of, write_distances_npz, write_distances_png};
 pub use export::{
     ExportOptions, ExportSummary, ExportedScans, POSES_NAME, WhichPoints, WhichVoxels, Written, export,
@@ -57,8 +63,8 @@ pub use export::{
 pub use flush_schedule::FlushEvery;
 pub use kept_source::is_map;
 pub use map_at::{
-    AnyMap, MapAt, check_is_no_file, open_any_map, read_all_maps, read_any_map, read_map, read_maps,
-    whole_map,
+    AnyMap, MapAt, check_is_no_file, open_any_map, read_all_maps, read_any_map, read_any_maps, read_map,
+    read_maps, whole_map,
 };
 pub use moving_points::read_moving_points;
 pub use new_poses::{PoseFile, poses_for};

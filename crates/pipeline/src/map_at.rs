@@ -197,6 +197,19 @@ pub fn read_any_map<T>(map: &Path, mut read: impl FnMut(&AnyMap) -> anyhow::Resu
     again_if_changed(|| read(&open_any_map(map)?))
 }
 
+/// As [`read_any_map`], for two maps.
+///
+/// # Errors
+///
+/// As for [`open_any_map`], and errors of `read`.
+pub fn read_any_maps<T>(
+    first: &Path,
+    second: &Path,
+    mut read: impl FnMut(&AnyMap, &AnyMap) -> anyhow::Result<T>,
+) -> anyhow::Result<T> {
+    again_if_changed(|| read(&open_any_map(first)?, &open_any_map(second)?))
+}
+
 /// As [`read_map`], for two maps.
 ///
 /// # Errors

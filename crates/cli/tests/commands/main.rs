@@ -6,6 +6,8 @@
 mod bag1;
 /// Main commands.
 mod cli;
+/// Changes between two maps, frontiers.
+mod cli_compare;
 /// Distance fields.
 mod cli_distance;
 /// merge, crop, clear and decay.

@@ -1,0 +1,168 @@
+use super::cli::{failure, json, output, scans, text, voxtile};
+use std::fs;
+use std::path::{Path, PathBuf};
+use tempfile::TempDir;
+use voxtile::{Clearing, MapConfig, MapOptions, Mapper, Scan};
+
+/// Makes a map of six scans from the origin, whose 5 x 5 rays end at `x` m in different voxels.
+fn wall_at(folder: &Path, name: &str, x: f64, resolution_m: f64, crs: Option<&str>) -> PathBuf {
+    let map = folder.join(name);
+    let mut config = MapConfig::new(resolution_m, 10.0).unwrap().with_clearing(Clearing::guarded());
+    config.crs = crs.map(str::to_owned);
+    let mut mapper = MapOptions::new().config(config).create_new(true).open(&map).unwrap();
+    let across = [-0.15, -0.05, 0.05, 0.15, 0.25];
+    let points =
+        across.iter().flat_map(|y| across.iter().map(move |z| [1.0, *y / 2.05, *z / 2.05].map(|k| k * x)));
+    let scan = Scan { points: points.collect(), ..Scan::default() };
+    for _ in 0..6 {
+        mapper.insert_scan(&scan).unwrap();
+    }
+    mapper.flush().unwrap();
+    map
+}
+
+#[test]
+fn changes_are_counted_listed_and_written() {
+    let folder = TempDir::new().unwrap();
+    let path = |name: &str| folder.path().join(name);
+    let before = wall_at(folder.path(), "before", 2.05, 0.1, Some("EPSG:25832"));
+    let after = wall_at(folder.path(), "after", 4.05, 0.1, None);
+    let maps = ["compare", text(&before), text(&after)];
+    let run = |more: &[&str]| json(&[&maps[..], more, &["--json"]].concat());
+    let found = run(&[]);
+    // Misses at the border of what a scan has seen are weak: seven voxels are uncertain.
+    let before_counts =
+        ["occupied", "changed", "uncertain"].map(|count| found["before"][count].as_u64().unwrap());
+    assert_eq!(before_counts, [25, 18, 7], "{found}");
+    assert_eq!(
+        (&found["after"]["occupied"], &found["after"]["not_seen"]),
+        (&25.into(), &25.into()),
+        "{found}"
+    );
+    assert_eq!((&found["vanished"]["clusters"], &found["appeared"]["clusters"]), (&1.into(), &0.into()));
+    let change = &found["changes"][0];
+    assert_eq!(
+        (&change["kind"], &change["voxels"], &change["number"]),
+        (&"vanished".into(), &18.into(), &1.into())
+    );
+    assert_eq!(change["bounds_m"], serde_json::json!({"min": [2.0, -0.2, -0.1], "max": [2.1, 0.3, 0.3]}));
+    assert_eq!((&found["tolerance_voxels"], &found["crs"]), (&1.into(), &"EPSG:25832".into()));
+    let warnings = found["warnings"].to_string();
+    assert!(warnings.contains("only one of the maps names a coordinate"), "{warnings}");
+
+    // The reverse: what appeared is known now, what is behind it is not.
+    let back = json(&["compare", text(&after), text(&before), "--json"]);
+    assert_eq!((&back["before"]["not_seen"], &back["after"]["changed"]), (&25.into(), &18.into()));
+    // Files.
+    let (csv, geojson, all_json) = (path("a.csv"), path("a.geojson"), path("a.json"));
+    for list in [&csv, &geojson, &all_json] {
+        assert_eq!(run(&["--list", text(list)])["list"], text(list));
+    }
+    let lines = fs::read_to_string(&csv).unwrap();
+    assert!(
+        lines.starts_with("number,kind,voxels,volume_m3,min_x") && lines.contains("\n1,vanished,18,"),
+        "{lines}"
+    );
+    let features: serde_json::Value = serde_json::from_slice(&fs::read(&geojson).unwrap()).unwrap();
+    assert_eq!(features["crs"]["properties"]["name"], "urn:ogc:def:crs:EPSG::25832");
+    assert_eq!(features["features"][0]["geometry"]["coordinates"][0][2], serde_json::json!([2.1, 0.3]));
+    let listed: serde_json::Value = serde_json::from_slice(&fs::read(&all_json).unwrap()).unwrap();
+    assert_eq!(listed["changes"], found["changes"]);
+    for (file, options, voxels) in
+        [("v.ply", &[][..], 18), ("all.ply", &["--all"], 50), ("v.csv", &[], 18), ("v.las", &[], 18)]
+    {
+        let file = path(file);
+        let written = run(&[&["-o", text(&file)][..], options].concat());
+        assert_eq!(written["output_voxels"], voxels, "{written}");
+        if text(&file).ends_with(".csv") {
+            let lines = fs::read_to_string(&file).unwrap();
+            assert!(lines.lines().count() == 19 && lines.contains(",66"), "{lines}");
+        }
+        if text(&file).ends_with(".las") {
+            // Point format 7: the class is byte 16 of a point.
+            let bytes = fs::read(&file).unwrap();
+            let first = u32::from_le_bytes(bytes[96..100].try_into().unwrap()) as usize;
+            assert_eq!((bytes[104] & 63, bytes[first + 16]), (7, 66));
+        }
+    }
+    let summary = output(&maps);
+    for part in [
+        "tolerance 1 voxel (0.100 m)",
+        "vanished  1 cluster of 18 voxels",
+        "1  vanished 18 voxels at 2.1 0.1 0.1",
+    ] {
+        assert!(summary.contains(part), "{summary}");
+    }
+    assert!(run(&["--min-voxels", "26"])["vanished"]["small_voxels"] == 18);
+    assert!(run(&["--region", "3", "-1", "-1", "5", "1", "1"])["before"]["occupied"] == 0);
+    // Octree files.
+    let bt = path("after.bt");
+    output(&["export", text(&after), "-o", text(&bt)]);
+    let of_file = json(&["compare", text(&before), text(&bt), "--json"]);
+    // The file has the clamps of all log-odds, so no voxel is uncertain.
+    assert_eq!(of_file["changes"][0]["voxels"], 25);
+    assert!(of_file["warnings"].to_string().contains("OctoMap's rule of clearing"), "{of_file}");
+}
+
+#[test]
+fn doubtful_and_unsuitable_maps_are_named() {
+    let folder = TempDir::new().unwrap();
+    let of = |name: &str, x, resolution_m, crs| wall_at(folder.path(), name, x, resolution_m, crs);
+    let map = of("map", 2.05, 0.1, None);
+    output(&["snapshot", text(&map), "first"]);
+    let snapshot = format!("{}@first", text(&map));
+    let found = json(&["compare", &snapshot, text(&map), "--json"]);
+    assert_eq!((&found["before"]["unchanged"], &found["maps"][0]["snapshot"]), (&25.into(), &"first".into()));
+    assert!(found["warnings"].to_string().contains("states of one map"), "{found}");
+    // Maps of the same scans, by OctoMap's rule.
+    let input = scans(&folder);
+    let [one, two] = ["one", "two"].map(|name| folder.path().join(name));
+    for map in [&one, &two] {
+        output(&["build", text(&input), "-o", text(map)]);
+    }
+    let found = json(&["compare", text(&one), text(&two), "--json"]);
+    let warnings = found["warnings"].to_string();
+    assert!(warnings.contains("contain scans of") && warnings.contains("--clearing guarded"), "{warnings}");
+    assert!(found["changes"] == serde_json::json!([]) && found["before"]["changed"] == 0, "{found}");
+    // Other space, another resolution, another system.
+    let cropped = folder.path().join("cropped");
+    let box_m = ["--region", "1", "-1", "-1", "3", "1", "1"];
+    output(&[&["crop", text(&map), "-o", text(&cropped)][..], &box_m].concat());
+    let far = folder.path().join("far");
+    let whole = of("whole", 60.05, 0.1, None);
+    let box_m = ["--region", "50", "-1", "-1", "70", "1", "1"];
+    output(&[&["crop", text(&whole), "-o", text(&far)][..], &box_m].concat());
+    let found = json(&["compare", text(&cropped), text(&far), "--json"]);
+    assert!(found["warnings"][0].as_str().unwrap().contains("have no place in common"), "{found}");
+    assert_eq!(found["before"]["not_seen"], 25);
+    let coarse = of("coarse", 2.05, 0.2, None);
+    let (code, message) = failure(&["compare", text(&map), text(&coarse)]);
+    assert!(code == 2 && message.contains("0.1 m and 0.2 m cannot be compared"), "{message}");
+    let (utm, other) = (of("utm", 2.05, 0.1, Some("EPSG:25832")), of("other", 2.05, 0.1, Some("EPSG:25833")));
+    let (code, message) = failure(&["compare", text(&utm), text(&other)]);
+    assert!(code != 0 && message.contains("coordinate reference system"), "{message}");
+    for (arguments, part) in [
+        (["--tolerance", "9"], "--tolerance: must be from 0 to 1.6 m"),
+        (["--certainty", "0.4"], "--certainty: must be above 0.5"),
+        (["--list", "a.txt"], "--list: a.txt: a list of changes is .csv, .json or .geojson"),
+        (["-o", "a.pcd"], "--output: a.pcd: voxels with classes are .las .laz"),
+    ] {
+        let (code, message) = failure(&[&["compare", text(&map), text(&map)][..], &arguments].concat());
+        assert!(code == 2 && message.contains(part), "{message}");
+    }
+    voxtile(&["compare", text(&map), "missing"]).assert().failure();
+}
+
+#[test]
+fn frontiers_are_listed() {
+    let folder = TempDir::new().unwrap();
+    let map = wall_at(folder.path(), "map", 2.05, 0.1, None);
+    let region = ["--region", "0", "-0.2", "-0.2", "2.1", "0.3", "0.3"];
+    let found = json(&[&["coverage", text(&map), "--json"][..], &region].concat());
+    let share = found["observed_share"].as_f64().unwrap();
+    assert!(found["occupied"] == 25 && (0.2..1.0).contains(&share), "{found}");
+    assert_eq!(found["frontiers"].as_array().unwrap().len(), 1, "{found}");
+    assert!(found["frontiers"][0]["area_m2"].as_f64().unwrap() > 0.5, "{found}");
+    let summary = output(&["coverage", text(&map)]);
+    assert!(summary.contains("observed  25 occupied voxels") && summary.contains("1 frontier,"), "{summary}");
+}

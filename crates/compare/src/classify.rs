@@ -1,0 +1,81 @@
+use crate::bits::Bits;
+use crate::block_bits::BlockBits;
+use crate::change::EpochCounts;
+use crate::voxel_class::VoxelClass;
+
+/// The occupied voxels of both maps in a block, by class.
+pub(crate) struct ClassBits {
+    /// By the order of [`VoxelClass::ALL`]. Unchanged voxels are those of the later map.
+    pub(crate) classes: [Bits; 7],
+    /// Unchanged voxels of the earlier map.
+    pub(crate) unchanged_before: Bits,
+}
+
+impl ClassBits {
+    /// Classifies the occupied voxels that are `inside`. Around these, the bits must reach as far as the tolerance.
+    pub(crate) fn of(before: &BlockBits, after: &BlockBits, inside: &Bits, tolerance_voxels: u32) -> Self {
+        let near_before = before.occupied.grown(tolerance_voxels);
+        let near_after = after.occupied.grown(tolerance_voxels);
+        let unchanged = |own: &BlockBits, near_other: &Bits| {
+            Bits::combined([&own.occupied, near_other, inside], |[own, near, inside]| own & near & inside)
+        };
+        let rest = |own: &BlockBits, near_other: &Bits| {
+            Bits::combined([&own.occupied, near_other, inside], |[own, near, inside]| own & !near & inside)
+        };
+        let (rest_before, rest_after) = (rest(before, &near_after), rest(after, &near_before));
+        let changed = |rest: &Bits, own: &BlockBits, other: &BlockBits| {
+            Bits::combined([rest, &own.surely_occupied, &other.surely_free], |[rest, own, free]| {
+                rest & own & free
+            })
+        };
+        let not_seen = |rest: &Bits, other: &BlockBits| {
+            Bits::combined([rest, &other.known], |[rest, known]| rest & !known)
+        };
+        let uncertain = |rest: &Bits, own: &BlockBits, other: &BlockBits| {
+            let bits = [rest, &own.surely_occupied, &other.surely_free, &other.known];
+            Bits::combined(bits, |[rest, own, free, known]| rest & known & !(own & free))
+        };
+        Self {
+            unchanged_before: unchanged(before, &near_after),
+            classes: [
+                unchanged(after, &near_before),
+                changed(&rest_after, after, before),
+                changed(&rest_before, before, after),
+                not_seen(&rest_after, before),
+                not_seen(&rest_before, after),
+                uncertain(&rest_after, after, before),
+                uncertain(&rest_before, before, after),
+            ],
+        }
+    }
+
+    pub(crate) fn of_class(&self, class: VoxelClass) -> &Bits {
+        &self.classes[class as usize]
+    }
+
+    /// Counts the voxels of both maps.
+    pub(crate) fn counts(&self) -> [EpochCounts; 2] {
+        let count = |class| self.of_class(class).count();
+        let of = |unchanged, changed, not_seen, uncertain| EpochCounts {
+            occupied: unchanged + changed + not_seen + uncertain,
+            unchanged,
+            changed,
+            not_seen,
+            uncertain,
+        };
+        [
+            of(
+                self.unchanged_before.count(),
+                count(VoxelClass::Vanished),
+                count(VoxelClass::NotSeenAfter),
+                count(VoxelClass::UncertainVanished),
+            ),
+            of(
+                count(VoxelClass::Unchanged),
+                count(VoxelClass::Appeared),
+                count(VoxelClass::NotSeenBefore),
+                count(VoxelClass::UncertainAppeared),
+            ),
+        ]
+    }
+}

@@ -1,0 +1,226 @@
+use crate::bits::Bits;
+use crate::block_bits::BlockBits;
+use crate::blocks::{BlockIndex, Cube, blocks_of, may_be_occupied};
+use crate::change::{Change, ChangeKind, Clusters, Comparison, EpochCounts};
+use crate::classify::ClassBits;
+use crate::components::{Components, order};
+use crate::joined::{BlockParts, Joined};
+use crate::mask_reader::{MaskReader, TilesOfBatch};
+use crate::options::CompareOptions;
+use crate::sweep::Sweep;
+use crate::tile_masks::Thresholds;
+use crate::voxel_class::VoxelClass;
+use rustc_hash::{FxHashMap, FxHashSet};
+use std::cmp::Reverse;
+use voxtile::mapper::MapView;
+use voxtile::space::VoxelBox;
+use voxtile::{Error, Result, TileIndex};
+
+/// Compares two maps: finds which occupied voxels of each are unchanged, changed or not seen in the other one, and lists
+/// the clusters of changed voxels.
+///
+/// The maps need equal resolutions; their tiles may differ. `progress` receives the number of blocks done and in total.
+///
+/// ```
+/// use voxtile::{InMemoryMapper, MapConfig, Mapper, Scan};
+/// use voxtile_compare::{ChangeKind, CompareOptions, compare};
+///
+/// # fn main() -> voxtile::Result<()> {
+/// let map_of = |point| -> voxtile::Result<InMemoryMapper> {
+///     let mut map = InMemoryMapper::new(MapConfig::new(0.1, 10.0)?)?;
+///     for _ in 0..3 {
+///         map.insert_scan(&Scan { points: vec![point], ..Scan::default() })?;
+///     }
+///     Ok(map)
+/// };
+/// // A ray that ended at 2 m passes through to 4 m.
+/// let (before, after) = (map_of([2.05, 0.05, 0.05])?, map_of([4.05, 0.05, 0.05])?);
+/// let options = CompareOptions::default().with_min_voxels(1);
+/// let comparison = compare(&before, &after, &options, &|_, _| {})?;
+/// assert_eq!(comparison.changes.len(), 1);
+/// assert_eq!(comparison.changes[0].kind, ChangeKind::Vanished);
+/// assert_eq!(comparison.after.not_seen, 1); // No ray reached 4 m before.
+/// # Ok(())
+/// # }
+/// ```
+///
+/// # Errors
+///
+/// Fails if the resolutions differ, an option is invalid, a tile cannot be read, or with [`Error::Stopped`].
+pub fn compare<A: MapView, B: MapView>(
+    before: &A,
+    after: &B,
+    options: &CompareOptions,
+    progress: &(dyn Fn(u64, u64) + Sync),
+) -> Result<Comparison> {
+    let comparer = Comparer::new(before, after, options)?;
+    let mut counts = [EpochCounts::default(); 2];
+    let mut joined = KINDS.map(|_| Joined::new(options.min_voxels.max(1)));
+    comparer.for_each_block(
+        progress,
+        |block, classes| comparer.block_result(block, classes),
+        |block, result| {
+            for (all, of_block) in counts.iter_mut().zip(result.counts) {
+                *all += of_block;
+            }
+            for (joined, parts) in joined.iter_mut().zip(result.parts) {
+                parts.join(block, joined);
+            }
+            Ok(())
+        },
+    )?;
+    let [vanished, appeared] = joined.map(Joined::finish);
+    let clusters = [&vanished, &appeared]
+        .map(|(listed, small)| Clusters::new(listed.iter().map(|cluster| &cluster.sums), *small));
+    let mut all: Vec<_> = vanished.0.into_iter().map(|cluster| (ChangeKind::Vanished, cluster)).collect();
+    all.extend(appeared.0.into_iter().map(|cluster| (ChangeKind::Appeared, cluster)));
+    all.sort_unstable_by_key(|(_, cluster)| (Reverse(cluster.sums.voxels), order(cluster.sums.lowest)));
+    let mut change_of_part = FxHashMap::default();
+    let mut changes = Vec::with_capacity(all.len());
+    for ((kind, cluster), number) in all.into_iter().zip(1..) {
+        change_of_part.extend(cluster.parts.into_iter().map(|lowest| (lowest, number)));
+        changes.push(Change::of(number, kind, &cluster.sums, &before.config().grid));
+    }
+    Ok(Comparison {
+        tolerance_voxels: comparer.tolerance_voxels,
+        min_voxels: options.min_voxels.max(1),
+        certain_log_odds: comparer.certain_log_odds,
+        before: counts[0],
+        after: counts[1],
+        vanished: clusters[0],
+        appeared: clusters[1],
+        changes,
+        change_of_part,
+    })
+}
+
+/// The classes of clustered voxels: vanished, then appeared.
+const KINDS: [VoxelClass; 2] = [VoxelClass::Vanished, VoxelClass::Appeared];
+
+/// Two maps, with checked options.
+pub(crate) struct Comparer<'a, A, B> {
+    before: &'a A,
+    after: &'a B,
+    options: &'a CompareOptions,
+    tolerance_voxels: u32,
+    certain_log_odds: f64,
+    /// Voxels of the region.
+    region: Option<VoxelBox>,
+}
+
+struct BlockResult {
+    counts: [EpochCounts; 2],
+    /// By [`KINDS`].
+    parts: [BlockParts; 2],
+}
+
+/// Masks of the tiles of both maps.
+struct LoadedTiles([TilesOfBatch; 2]);
+
+impl<'a, A: MapView, B: MapView> Comparer<'a, A, B> {
+    pub(crate) fn new(before: &'a A, after: &'a B, options: &'a CompareOptions) -> Result<Self> {
+        let (grid, other) = (before.config().grid, after.config().grid);
+        if grid.resolution_m() != other.resolution_m() {
+            let reason = format!(
+                "voxels of {} m and {} m cannot be compared: build one of the maps again with the resolution of the \
+                 other (`voxtile remap -o` for a map that keeps its scans)",
+                grid.resolution_m(),
+                other.resolution_m()
+            );
+            return Err(Error::argument("maps", reason));
+        }
+        Ok(Self {
+            before,
+            after,
+            options,
+            tolerance_voxels: options.tolerance_voxels(&grid)?,
+            certain_log_odds: options.certain_log_odds()?,
+            region: options.region.map(|region| grid.voxels_in(&region)),
+        })
+    }
+
+    /// Classifies the voxels of all blocks with occupied voxels.
+    pub(crate) fn for_each_block<T: Send>(
+        &self,
+        progress: &(dyn Fn(u64, u64) + Sync),
+        work: impl Fn(BlockIndex, &ClassBits) -> Result<T> + Sync,
+        take: impl FnMut(BlockIndex, T) -> Result<()>,
+    ) -> Result<()> {
+        let options = self.options;
+        let thresholds = [
+            Thresholds::of(self.before, self.certain_log_odds),
+            Thresholds::of(self.after, self.certain_log_odds),
+        ];
+        let cache_bytes = options.memory_bytes / 4;
+        let mut before = MaskReader::new(self.before, thresholds[0], cache_bytes);
+        let mut after = MaskReader::new(self.after, thresholds[1], cache_bytes);
+        let blocks = self.blocks();
+        let sweep =
+            Sweep { blocks: &blocks, memory_bytes: options.memory_bytes / 2, stop: &options.stop, progress };
+        sweep.run(
+            |blocks| {
+                let tiles = [self.tiles_around(blocks, before.map()), self.tiles_around(blocks, after.map())];
+                Ok(LoadedTiles([before.read(&tiles[0])?, after.read(&tiles[1])?]))
+            },
+            |block, loaded| work(block, &self.classes_of(block, loaded)),
+            take,
+        )
+    }
+
+    fn blocks(&self) -> Vec<BlockIndex> {
+        let grid = &self.before.config().grid;
+        let mut blocks = blocks_of(grid, occupied_tiles(self.before));
+        blocks.extend(blocks_of(&self.after.config().grid, occupied_tiles(self.after)));
+        blocks.sort_unstable();
+        blocks.dedup();
+        if let Some(region) = self.region {
+            blocks.retain(|&block| {
+                let [min, end] = Cube::of_block(block).positions_of(&region);
+                (0..3).all(|k| min[k] < end[k])
+            });
+        }
+        blocks
+    }
+
+    /// The tiles of a map that overlap blocks or their surroundings.
+    fn tiles_around(&self, blocks: &[BlockIndex], map: &impl MapView) -> Vec<TileIndex> {
+        let cubes = blocks.iter().map(|&block| Cube::of_block(block).grown(self.tolerance_voxels));
+        let tiles: FxHashSet<TileIndex> = cubes.flat_map(|cube| cube.tiles(map)).collect();
+        let mut tiles: Vec<TileIndex> = tiles.into_iter().collect();
+        tiles.sort_unstable();
+        tiles
+    }
+
+    fn classes_of(&self, block: BlockIndex, LoadedTiles(loaded): &LoadedTiles) -> ClassBits {
+        let own = Cube::of_block(block);
+        let cube = own.grown(self.tolerance_voxels);
+        let before = BlockBits::of(cube, &cube.tiles(self.before), &loaded[0]);
+        let after = BlockBits::of(cube, &cube.tiles(self.after), &loaded[1]);
+        let mut inside = Bits::new(cube);
+        let [min, end] = match &self.region {
+            Some(region) => own.positions_of(region),
+            None => [[0; 3], [own.edge; 3]],
+        };
+        let moved = |place: [usize; 3]| place.map(|k| k + self.tolerance_voxels as usize);
+        inside.add_box(moved(min), moved(end));
+        ClassBits::of(&before, &after, &inside, self.tolerance_voxels)
+    }
+
+    fn block_result(&self, block: BlockIndex, classes: &ClassBits) -> Result<BlockResult> {
+        let mut components = KINDS.map(|class| Components::of(classes.of_class(class)));
+        let [vanished, appeared] = &mut components;
+        if !self.before.config().layers().is_none() {
+            vanished.add_layers(self.before)?;
+        }
+        if !self.after.config().layers().is_none() {
+            appeared.add_layers(self.after)?;
+        }
+        let parts = components.map(|components| BlockParts::of(components, block));
+        Ok(BlockResult { counts: classes.counts(), parts })
+    }
+}
+
+/// The tiles of a map that may have occupied voxels.
+fn occupied_tiles(map: &impl MapView) -> impl Iterator<Item = TileIndex> {
+    map.tile_indices().into_iter().filter(|&tile| may_be_occupied(map, tile))
+}

@@ -1,0 +1,42 @@
+//! Changes between two maps of one place, and what was not seen.
+//!
+//! A map knows free, occupied and unknown voxels. So a surface of the earlier map has *vanished* only if the later map
+//! saw through its place, and is *not seen* where the later map has no observation.
+//!
+//! ```text
+//! map -> tile_masks, mask_reader                  known, occupied, surely occupied, surely free voxels of tiles
+//!     -> blocks, block_bits, bits                  the same as bits of a block of 128 x 128 x 128 voxels and around it
+//!     -> classify                                 a class for each occupied voxel
+//!     -> components                               connected voxels of a class within a block
+//!     -> joined                                   the same across blocks
+//! compare -> Comparison                           counts, and the list of changes
+//! for_each_voxel                                  the voxels with their classes, in a second pass
+//! frontiers                                       free voxels next to unknown ones, of one map
+//! ```
+//!
+//! All of it takes constant memory per core, in addition to the list of changes. Blocks do not depend on tiles, so the
+//! result depends on neither tiles, nor memory, nor threads.
+
+mod bits;
+mod block_bits;
+mod blocks;
+mod change;
+mod classify;
+mod compare;
+mod components;
+mod frontiers;
+mod joined;
+mod mask_reader;
+mod options;
+mod sets;
+mod sweep;
+mod tile_masks;
+mod visit;
+mod voxel_class;
+
+pub use change::{Change, ChangeKind, Clusters, Comparison, EpochCounts};
+pub use compare::compare;
+pub use frontiers::{Coverage, Frontier, FrontierOptions, frontiers};
+pub use options::{CompareOptions, MAX_TOLERANCE_VOXELS};
+pub use visit::{ComparedVoxel, for_each_voxel};
+pub use voxel_class::VoxelClass;

@@ -1,0 +1,8 @@
+//! Tests of comparisons and frontiers.
+
+mod epochs;
+mod exact;
+mod frontiers;
+mod naive;
+mod random_maps;
+mod refused;

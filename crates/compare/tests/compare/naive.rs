@@ -1,0 +1,86 @@
+//! The definitions, voxel by voxel.
+
+use std::collections::{BTreeMap, BTreeSet};
+use voxtile::mapper::MapView;
+use voxtile::{Aabb, VoxelIndex};
+use voxtile_compare::VoxelClass;
+
+/// Observed voxels with their log-odds.
+pub type Voxels = BTreeMap<VoxelIndex, f64>;
+
+pub fn voxels_of(map: &impl MapView) -> Voxels {
+    let mut voxels = Voxels::new();
+    for tile in map.tiles() {
+        voxels.extend(tile.unwrap().voxels().map(|voxel| (voxel.index, voxel.evidence.log_odds)));
+    }
+    voxels
+}
+
+pub fn around([x, y, z]: VoxelIndex, reach: i32) -> impl Iterator<Item = VoxelIndex> {
+    let edge = 2 * reach + 1;
+    (0..edge.pow(3))
+        .map(move |k| [x + k % edge - reach, y + k / edge % edge - reach, z + k / edge / edge - reach])
+}
+
+/// Classes of the occupied voxels of `own`; `names` are those of a change, not seen, uncertain.
+pub fn classes(
+    own: &Voxels,
+    other: &Voxels,
+    tolerance: i32,
+    certain: f64,
+    is_inside: &dyn Fn(VoxelIndex) -> bool,
+    names: [VoxelClass; 3],
+) -> BTreeMap<VoxelIndex, VoxelClass> {
+    let occupied = own.iter().filter(|(voxel, log_odds)| **log_odds >= 0.0 && is_inside(**voxel));
+    let class_of = |(voxel, log_odds): (&VoxelIndex, &f64)| {
+        let is_near = |near: VoxelIndex| other.get(&near).is_some_and(|log_odds| *log_odds >= 0.0);
+        let class = if around(*voxel, tolerance).any(is_near) {
+            VoxelClass::Unchanged
+        } else {
+            match other.get(voxel) {
+                None => names[1],
+                Some(free) if *log_odds >= certain && *free <= -certain => names[0],
+                Some(_) => names[2],
+            }
+        };
+        (*voxel, class)
+    };
+    occupied.map(class_of).collect()
+}
+
+/// Connected voxels, the largest first, then the one with the lowest voxel by z, y, x.
+pub fn clusters(voxels: impl Iterator<Item = VoxelIndex>) -> Vec<BTreeSet<VoxelIndex>> {
+    let mut rest: BTreeSet<VoxelIndex> = voxels.collect();
+    let mut clusters = Vec::new();
+    while let Some(first) = rest.pop_first() {
+        let (mut cluster, mut open) = (BTreeSet::from([first]), vec![first]);
+        while let Some(voxel) = open.pop() {
+            for near in around(voxel, 1) {
+                if rest.remove(&near) {
+                    cluster.insert(near);
+                    open.push(near);
+                }
+            }
+        }
+        clusters.push(cluster);
+    }
+    clusters.sort_by_key(|cluster| {
+        let lowest = cluster.iter().map(|[x, y, z]| [*z, *y, *x]).min();
+        (std::cmp::Reverse(cluster.len()), lowest)
+    });
+    clusters
+}
+
+/// Box of voxels of 0.1 m in metres.
+pub fn bounds_m(cluster: &BTreeSet<VoxelIndex>) -> Aabb {
+    let along = |k: usize| cluster.iter().map(move |voxel| voxel[k]);
+    let metres = |k: i32| f64::from(k) * 0.1;
+    Aabb {
+        min: std::array::from_fn(|k| metres(along(k).min().unwrap())),
+        max: std::array::from_fn(|k| metres(along(k).max().unwrap() + 1)),
+    }
+}
+
+pub fn is_same_box(a: &Aabb, b: &Aabb) -> bool {
+    (0..3).all(|k| (a.min[k] - b.min[k]).abs() < 1e-9 && (a.max[k] - b.max[k]).abs() < 1e-9)
+}

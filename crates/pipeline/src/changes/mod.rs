@@ -1,0 +1,15 @@
+//! Files of changes between two maps.
+//!
+//! ```text
+//! Comparison -> write_change_list: a row per change      list
+//!            -> write_changed_voxels: a row per voxel    voxels
+//! two maps -> warnings_of: doubts about the result       warnings
+//! ```
+
+mod list;
+mod voxels;
+mod warnings;
+
+pub use list::{ListFormat, write_change_list};
+pub use voxels::{WhichChanges, changes_format, class_code, write_changed_voxels};
+pub use warnings::{check_crs, warnings_of};
