@@ -40,7 +40,7 @@ until_it() {
     return 1
 }
 
-# The first map of somebody who has no data.
+# A first map, without data.
 first_map() {
     voxtile demo --out demo
     voxtile query demo/map_tiles 12.3 -4.5 1.0
@@ -125,7 +125,7 @@ operator() {
     voxtile verify damaged
 }
 
-# Somebody who looks: picture, report, page.
+# Pictures, report, page.
 looker() {
     voxtile picture street -o street.png
     voxtile report street -o street.html

@@ -80,7 +80,7 @@ def fastdds(domain, _port):
     node.create_subscription(PointCloud2, TOPIC, got.append, QoSProfile(depth=1, **latched))
     seconds = waited(lambda: got, lambda: rclpy.spin_once(node, timeout_sec=0.01))
     report("topic", got and len(got[0].data), seconds)
-    # The node refuses responses of more than 64 kB, and says so in its log.
+    # The node refuses responses of more than 64 kB, with the reason in its log.
     print("service - -")
     rclpy.shutdown()
 

@@ -45,7 +45,7 @@ impl Setting {
         let edge_m = f64::from(voxels) * RESOLUTION_M;
         for number in 0..27 {
             let (column, row) = (f64::from(number % 9), f64::from(number / 9));
-            // Two rows next to the way of the sensor, and one at a wall.
+            // Two rows next to the trajectory, and one at a wall.
             let y = [1.0, 3.2, 7.6][row as usize] + random.between(0.0, 0.3);
             let x = 1.0 + 1.85 * column + random.between(0.0, 0.3);
             let z = [0.0, 0.75, 1.6][number as usize % 3];
