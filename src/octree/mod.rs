@@ -2,7 +2,8 @@
 //!
 //! ```text
 //! Octree       16 levels below the root, f32 log-odds, pruned immediately  tree, block, leaves, overrides
-//! read, write  `.bt` (occupied / free) and `.ot` (all values) files         codec, brick_nodes, brick_values, node_colour
+//! read, write  `.bt` (occupied / free) and `.ot` (all values) files        codec, brick_nodes, brick_values,
+//!                                                                          node_colour
 //! ```
 //!
 //! A tree is independent of metres and tiles: a voxel is its [`MortonCode`](crate::space::MortonCode). A file adds the

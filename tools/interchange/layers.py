@@ -1,4 +1,4 @@
-"""Compares the layers of an exported map, as third-party libraries read them, with sums over the points it was built of.
+"""Compares the layers of an exported map, as third-party libraries read them, with sums over its points.
 
     layers.py VOXTILE FOLDER COLOR_OCTREE
 

@@ -56,10 +56,10 @@ impl ScansWithout {
 ///
 /// # Errors
 ///
-/// A map that keeps no scans or has other scans too; a layer that the map does not have and no scan can fill; a region whose borders are not borders of the new tiles; an
-/// invalid configuration; a folder with other content; another process that creates the same map; damage; an I/O error;
-/// a request to stop. There is no map then. The exception is a failure of the last step, the sync of the folder that
-/// contains the map.
+/// A map that keeps no scans or has other scans too; a layer that the map does not have and no scan can fill; a region
+/// whose borders are not borders of the new tiles; an invalid configuration; a folder with other content; another
+/// process that creates the same map; damage; an I/O error; a request to stop. There is no map then. The exception is a
+/// failure of the last step, the sync of the folder that contains the map.
 pub fn rebuild(
     map: &MapReader,
     output: impl Into<MapPath>,
