@@ -107,7 +107,7 @@ pub enum Command {
     Snapshot(SnapshotArgs),
     /// List a map's snapshots
     Snapshots(SnapshotsArgs),
-    /// Compare two maps, or two snapshots of a map
+    /// Count the voxels that differ between two maps, or two snapshots of a map
     Diff(DiffArgs),
     /// List the things that vanished or appeared between two maps, and what only one of them has seen
     Compare(CompareArgs),

@@ -31,4 +31,13 @@ impl BlockBits {
         }
         bits
     }
+
+    /// The surely free voxels whose six neighbors are observed. Rays that graze a surface far away mark its voxels as
+    /// free, but not those below it.
+    pub(crate) fn clearly_free(&self) -> Bits {
+        let near: [Bits; 6] = std::array::from_fn(|k| self.known.moved(k / 2, k % 2 == 0));
+        let [a, b, c, d, e, f] = &near;
+        let bits = [&self.surely_free, a, b, c, d, e, f];
+        Bits::combined(bits, |words| words.iter().fold(u64::MAX, |all, word| all & word))
+    }
 }

@@ -40,7 +40,8 @@ pub struct EpochCounts {
     pub changed: u64,
     /// Unknown in the other map.
     pub not_seen: u64,
-    /// Seen free in the other map, but one of the maps has too little evidence.
+    /// Seen free in the other map, but one of the maps has too little evidence, or the other one has not observed all
+    /// six neighbors.
     pub uncertain: u64,
 }
 

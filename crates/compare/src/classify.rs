@@ -3,6 +3,11 @@ use crate::block_bits::BlockBits;
 use crate::change::EpochCounts;
 use crate::voxel_class::VoxelClass;
 
+/// Number of voxels around a voxel on which its class depends.
+pub(crate) fn reach(tolerance_voxels: u32) -> u32 {
+    tolerance_voxels.max(1)
+}
+
 /// The occupied voxels of both maps in a block, by class.
 pub(crate) struct ClassBits {
     /// By the order of [`VoxelClass::ALL`]. Unchanged voxels are those of the later map.
@@ -12,7 +17,7 @@ pub(crate) struct ClassBits {
 }
 
 impl ClassBits {
-    /// Classifies the occupied voxels that are `inside`. Around these, the bits must reach as far as the tolerance.
+    /// Classifies the occupied voxels that are `inside`. Around these, the bits must reach as far as [`reach`].
     pub(crate) fn of(before: &BlockBits, after: &BlockBits, inside: &Bits, tolerance_voxels: u32) -> Self {
         let near_before = before.occupied.grown(tolerance_voxels);
         let near_after = after.occupied.grown(tolerance_voxels);
@@ -23,28 +28,27 @@ impl ClassBits {
             Bits::combined([&own.occupied, near_other, inside], |[own, near, inside]| own & !near & inside)
         };
         let (rest_before, rest_after) = (rest(before, &near_after), rest(after, &near_before));
-        let changed = |rest: &Bits, own: &BlockBits, other: &BlockBits| {
-            Bits::combined([rest, &own.surely_occupied, &other.surely_free], |[rest, own, free]| {
-                rest & own & free
-            })
+        let (free_before, free_after) = (before.clearly_free(), after.clearly_free());
+        let changed = |rest: &Bits, own: &BlockBits, free: &Bits| {
+            Bits::combined([rest, &own.surely_occupied, free], |[rest, own, free]| rest & own & free)
         };
         let not_seen = |rest: &Bits, other: &BlockBits| {
             Bits::combined([rest, &other.known], |[rest, known]| rest & !known)
         };
-        let uncertain = |rest: &Bits, own: &BlockBits, other: &BlockBits| {
-            let bits = [rest, &own.surely_occupied, &other.surely_free, &other.known];
+        let uncertain = |rest: &Bits, own: &BlockBits, other: &BlockBits, free: &Bits| {
+            let bits = [rest, &own.surely_occupied, free, &other.known];
             Bits::combined(bits, |[rest, own, free, known]| rest & known & !(own & free))
         };
         Self {
             unchanged_before: unchanged(before, &near_after),
             classes: [
                 unchanged(after, &near_before),
-                changed(&rest_after, after, before),
-                changed(&rest_before, before, after),
+                changed(&rest_after, after, &free_before),
+                changed(&rest_before, before, &free_after),
                 not_seen(&rest_after, before),
                 not_seen(&rest_before, after),
-                uncertain(&rest_after, after, before),
-                uncertain(&rest_before, before, after),
+                uncertain(&rest_after, after, before, &free_before),
+                uncertain(&rest_before, before, after, &free_after),
             ],
         }
     }

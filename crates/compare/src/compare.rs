@@ -2,7 +2,7 @@ use crate::bits::Bits;
 use crate::block_bits::BlockBits;
 use crate::blocks::{BlockIndex, Cube, blocks_of, may_be_occupied};
 use crate::change::{Change, ChangeKind, Clusters, Comparison, EpochCounts};
-use crate::classify::ClassBits;
+use crate::classify::{ClassBits, reach};
 use crate::components::{Components, order};
 use crate::joined::{BlockParts, Joined};
 use crate::mask_reader::{MaskReader, TilesOfBatch};
@@ -26,20 +26,22 @@ use voxtile::{Error, Result, TileIndex};
 /// use voxtile_compare::{ChangeKind, CompareOptions, compare};
 ///
 /// # fn main() -> voxtile::Result<()> {
-/// let map_of = |point| -> voxtile::Result<InMemoryMapper> {
+/// // Nine rays end at a distance along x.
+/// let map_of = |x: f64| -> voxtile::Result<InMemoryMapper> {
+///     let slopes = [-0.03, 0.02, 0.07];
+///     let points = slopes.iter().flat_map(|y| slopes.iter().map(move |z| [x, x * y, x * z]));
+///     let scan = Scan { points: points.collect(), ..Scan::default() };
 ///     let mut map = InMemoryMapper::new(MapConfig::new(0.1, 10.0)?)?;
 ///     for _ in 0..3 {
-///         map.insert_scan(&Scan { points: vec![point], ..Scan::default() })?;
+///         map.insert_scan(&scan)?;
 ///     }
 ///     Ok(map)
 /// };
-/// // A ray that ended at 2 m passes through to 4 m.
-/// let (before, after) = (map_of([2.05, 0.05, 0.05])?, map_of([4.05, 0.05, 0.05])?);
+/// // The rays that ended at 2 m pass through to 4 m.
 /// let options = CompareOptions::default().with_min_voxels(1);
-/// let comparison = compare(&before, &after, &options, &|_, _| {})?;
-/// assert_eq!(comparison.changes.len(), 1);
+/// let comparison = compare(&map_of(2.05)?, &map_of(4.05)?, &options, &|_, _| {})?;
 /// assert_eq!(comparison.changes[0].kind, ChangeKind::Vanished);
-/// assert_eq!(comparison.after.not_seen, 1); // No ray reached 4 m before.
+/// assert_eq!(comparison.after.not_seen, 9); // No ray reached 4 m before.
 /// # Ok(())
 /// # }
 /// ```
@@ -184,7 +186,7 @@ impl<'a, A: MapView, B: MapView> Comparer<'a, A, B> {
 
     /// The tiles of a map that overlap blocks or their surroundings.
     fn tiles_around(&self, blocks: &[BlockIndex], map: &impl MapView) -> Vec<TileIndex> {
-        let cubes = blocks.iter().map(|&block| Cube::of_block(block).grown(self.tolerance_voxels));
+        let cubes = blocks.iter().map(|&block| Cube::of_block(block).grown(reach(self.tolerance_voxels)));
         let tiles: FxHashSet<TileIndex> = cubes.flat_map(|cube| cube.tiles(map)).collect();
         let mut tiles: Vec<TileIndex> = tiles.into_iter().collect();
         tiles.sort_unstable();
@@ -193,7 +195,7 @@ impl<'a, A: MapView, B: MapView> Comparer<'a, A, B> {
 
     fn classes_of(&self, block: BlockIndex, LoadedTiles(loaded): &LoadedTiles) -> ClassBits {
         let own = Cube::of_block(block);
-        let cube = own.grown(self.tolerance_voxels);
+        let cube = own.grown(reach(self.tolerance_voxels));
         let before = BlockBits::of(cube, &cube.tiles(self.before), &loaded[0]);
         let after = BlockBits::of(cube, &cube.tiles(self.after), &loaded[1]);
         let mut inside = Bits::new(cube);
@@ -201,7 +203,7 @@ impl<'a, A: MapView, B: MapView> Comparer<'a, A, B> {
             Some(region) => own.positions_of(region),
             None => [[0; 3], [own.edge; 3]],
         };
-        let moved = |place: [usize; 3]| place.map(|k| k + self.tolerance_voxels as usize);
+        let moved = |place: [usize; 3]| place.map(|k| k + reach(self.tolerance_voxels) as usize);
         inside.add_box(moved(min), moved(end));
         ClassBits::of(&before, &after, &inside, self.tolerance_voxels)
     }

@@ -1,7 +1,7 @@
 //! Changes between two maps of one place, and what was not seen.
 //!
 //! A map knows free, occupied and unknown voxels. So a surface of the earlier map has *vanished* only if the later map
-//! saw through its place, and is *not seen* where the later map has no observation.
+//! saw through its place and around it, and is *not seen* where the later map has no observation.
 //!
 //! ```text
 //! map -> tile_masks, mask_reader                  known, occupied, surely occupied, surely free voxels of tiles

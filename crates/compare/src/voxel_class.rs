@@ -14,9 +14,11 @@ pub enum VoxelClass {
     NotSeenBefore,
     /// Occupied in the earlier map, unknown in the later one.
     NotSeenAfter,
-    /// As [`VoxelClass::Appeared`], but one of the maps has too little evidence.
+    /// As [`VoxelClass::Appeared`], but one of the maps has too little evidence, or the earlier one has not observed all
+    /// six neighbors.
     UncertainAppeared,
-    /// As [`VoxelClass::Vanished`], but one of the maps has too little evidence.
+    /// As [`VoxelClass::Vanished`], but one of the maps has too little evidence, or the later one has not observed all
+    /// six neighbors.
     UncertainVanished,
 }
 

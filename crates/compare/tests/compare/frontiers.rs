@@ -1,4 +1,4 @@
-use crate::naive::{bounds_m, clusters, is_same_box, voxels_of};
+use crate::naive::{bounds_m, clusters, is_same_box, neighbors, voxels_of};
 use crate::random_maps::{TILE_SIZES_M, random_map, random_region};
 use std::collections::BTreeSet;
 use testkit::random_scans::Random;
@@ -6,14 +6,6 @@ use testkit::support::cases;
 use voxtile::VoxelIndex;
 use voxtile::mapper::MapView;
 use voxtile_compare::{FrontierOptions, frontiers};
-
-fn neighbors(voxel: VoxelIndex) -> [VoxelIndex; 6] {
-    std::array::from_fn(|k| {
-        let mut near = voxel;
-        near[k / 2] += if k % 2 == 0 { 1 } else { -1 };
-        near
-    })
-}
 
 #[test]
 fn frontiers_of_random_maps_equal_the_definition() {

@@ -22,6 +22,15 @@ pub fn around([x, y, z]: VoxelIndex, reach: i32) -> impl Iterator<Item = VoxelIn
         .map(move |k| [x + k % edge - reach, y + k / edge % edge - reach, z + k / edge / edge - reach])
 }
 
+/// The voxels that share a face with a voxel.
+pub fn neighbors(voxel: VoxelIndex) -> [VoxelIndex; 6] {
+    std::array::from_fn(|k| {
+        let mut near = voxel;
+        near[k / 2] += if k % 2 == 0 { 1 } else { -1 };
+        near
+    })
+}
+
 /// Classes of the occupied voxels of `own`; `names` are those of a change, not seen, uncertain.
 pub fn classes(
     own: &Voxels,
@@ -32,6 +41,7 @@ pub fn classes(
     names: [VoxelClass; 3],
 ) -> BTreeMap<VoxelIndex, VoxelClass> {
     let occupied = own.iter().filter(|(voxel, log_odds)| **log_odds >= 0.0 && is_inside(**voxel));
+    let is_surrounded = |voxel: VoxelIndex| neighbors(voxel).iter().all(|near| other.contains_key(near));
     let class_of = |(voxel, log_odds): (&VoxelIndex, &f64)| {
         let is_near = |near: VoxelIndex| other.get(&near).is_some_and(|log_odds| *log_odds >= 0.0);
         let class = if around(*voxel, tolerance).any(is_near) {
@@ -39,7 +49,7 @@ pub fn classes(
         } else {
             match other.get(voxel) {
                 None => names[1],
-                Some(free) if *log_odds >= certain && *free <= -certain => names[0],
+                Some(free) if *log_odds >= certain && *free <= -certain && is_surrounded(*voxel) => names[0],
                 Some(_) => names[2],
             }
         };

@@ -20,8 +20,8 @@ pub fn fill(map: &mut impl Mapper, seed: u64, epoch: u64) {
     }
     let [places, states] = &mut [Random(seed), Random(seed * 100 + epoch)];
     for _ in 0..25 {
-        let (middle, count) = (places.point(center, 1.2), 10 + places.below(60));
-        let points: Vec<Point> = (0..count).map(|_| places.point(middle, 0.3)).collect();
+        let (middle, count) = (places.point(center, 1.2), 100 + places.below(150));
+        let points: Vec<Point> = (0..count).map(|_| places.point(middle, 0.25)).collect();
         for _ in 0..1 + states.below(4) {
             let is_occupied = vec![states.below(2) == 0; points.len()];
             let batch = PointBatch { points: &points, intensities: None, is_occupied: &is_occupied };
