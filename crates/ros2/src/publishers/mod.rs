@@ -26,5 +26,5 @@ mod voxel_changes;
 
 pub use distance_field::DistancePublisher;
 pub use extent::Extent;
-pub use octomap::octomap;
+pub use octomap::{class_of, format_of, octomap};
 pub use publishing::{PUBLISHED_CLOUDS, Publishing};

@@ -1,6 +1,6 @@
 use crate::live_map::{LiveMap, Moment};
 use crate::messages::{Empty, Octomap, OctomapInBoxRequest, OctomapInBoxResponse, OctomapResponse, Outcome};
-use crate::publishers::{Extent, octomap};
+use crate::publishers::{Extent, class_of, format_of, octomap};
 use anyhow::ensure;
 use voxtile::octree::OctreeFormat;
 use voxtile::{Aabb, Error};
@@ -46,7 +46,8 @@ pub fn in_box(map: &LiveMap, max_bytes: Option<usize>, request: OctomapInBoxRequ
 /// Returns a tree without nodes. Readers use its type and resolution even if it is empty.
 fn empty(map: &LiveMap, moment: &Moment, format: OctreeFormat) -> Octomap {
     let (binary, resolution) = (format == OctreeFormat::Bt, map.grid().resolution_m());
-    Octomap { header: map.header(moment), binary, id: "OcTree".to_owned(), resolution, data: Vec::new() }
+    let id = class_of(format_of(format, map.layers())).to_owned();
+    Octomap { header: map.header(moment), binary, id, resolution, data: Vec::new() }
 }
 
 /// Bytes of a response besides the octree and the name of the frame, rounded up.
@@ -82,7 +83,7 @@ fn make(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use voxtile::{MapConfig, Mapper, OutOfCoreTileMapper, Scan};
+    use voxtile::{Layers, MapConfig, Mapper, OutOfCoreTileMapper, PointAttributes, Scan, ScanRef};
 
     #[test]
     fn a_failed_octree_is_empty_with_the_properties_of_the_map() {
@@ -103,6 +104,25 @@ mod tests {
             );
             assert_eq!((&*made.header.frame_id, made.header.stamp.nanosec), ("map", 7));
         }
+    }
+
+    #[test]
+    fn a_map_with_colours_has_a_color_octree() {
+        let folder = tempfile::tempdir().unwrap();
+        let layers: Layers = "colour".parse().unwrap();
+        let config = MapConfig::new(0.1, 10.0).unwrap().with_layers(layers);
+        let mut mapper = OutOfCoreTileMapper::create(folder.path().join("map"), config).unwrap();
+        let attributes = PointAttributes { colours: vec![Some([1, 2, 3])], classes: Vec::new() };
+        let points = [[2.05, 0.05, 0.05]];
+        let scan = ScanRef::in_world([0.05; 3], &points).with_attributes(&attributes).unwrap();
+        mapper.insert_points(&scan).unwrap();
+        let map = LiveMap::new("map".to_owned(), mapper.reader().unwrap(), [0.05; 3], 7);
+        let extent = Extent { radius_m: 5.0, heights_m: [f64::NEG_INFINITY, f64::INFINITY] };
+        let full = around_sensor(&map, &extent, OctreeFormat::Ot, None, Empty::default()).map;
+        assert_eq!((&*full.id, full.binary, full.data.len() % 8), ("ColorOcTree", false, 0));
+        assert!(full.data.windows(3).any(|bytes| bytes == [1, 2, 3]));
+        let binary = around_sensor(&map, &extent, OctreeFormat::Bt, None, Empty::default()).map;
+        assert_eq!((&*binary.id, binary.binary), ("OcTree", true));
     }
 
     #[test]
