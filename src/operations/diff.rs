@@ -4,13 +4,13 @@ use crate::error::{Error, Result};
 use crate::mapper::{MapReader, MapView};
 use crate::sensor::Evidence;
 use crate::space::TileIndex;
-use crate::tile::Table;
+use crate::tile::{LayerTable, Table};
 use serde::Serialize;
 
 /// Difference between two maps, or between two states of one map.
 ///
 /// *Flipped* voxels changed from free to occupied or back, each by its own map's threshold. *Changed* voxels differ
-/// only in log-odds or count.
+/// only in log-odds or count. Layers are counted apart.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 #[non_exhaustive]
 pub struct Diff {
@@ -18,7 +18,7 @@ pub struct Diff {
     pub tiles_appeared: u64,
     /// Number of tiles that only the first map has.
     pub tiles_gone: u64,
-    /// Number of tiles in both maps with different voxels or evidence.
+    /// Number of tiles in both maps with different voxels, evidence or layers.
     pub tiles_changed: u64,
     /// Number of tiles that are equal in both maps.
     pub tiles_equal: u64,
@@ -43,6 +43,8 @@ pub struct VoxelDiff {
     pub to_free: u64,
     /// Occupied in both or free in both, with other log-odds or count.
     pub changed: u64,
+    /// With other sums of [`Layers`](crate::Layers), whatever the evidence. 0 unless both maps have the same layers.
+    pub layers: u64,
 }
 
 /// Difference of a tile.
@@ -140,7 +142,8 @@ fn tile_diff(first: &MapReader, second: &MapReader, index: TileIndex) -> Result<
     let [a, b] = [first.tile_uncached(index)?, second.tile_uncached(index)?];
     let none = Table::default();
     let [a, b] = [&a, &b].map(|tile| tile.as_ref().map_or(&none, |tile| tile.table()));
-    let voxels = VoxelDiff::of(first.config(), a, second.config(), b);
+    let mut voxels = VoxelDiff::of(first.config(), a, second.config(), b);
+    voxels.layers = layer_differences(first.config(), a, second.config(), b);
     let change = match (a.is_empty(), b.is_empty()) {
         (true, false) => TileChange::Appeared,
         (false, true) => TileChange::Gone,
@@ -148,6 +151,16 @@ fn tile_diff(first: &MapReader, second: &MapReader, index: TileIndex) -> Result<
         _ => TileChange::Changed,
     };
     Ok(Some(TileDiff { tile: index.to_array(), change, voxels }))
+}
+
+fn layer_differences(config_a: &MapConfig, a: &Table, config_b: &MapConfig, b: &Table) -> u64 {
+    let layers = config_a.layers();
+    if layers.is_none() || layers != config_b.layers() {
+        return 0;
+    }
+    let none = LayerTable::new(layers);
+    let [a, b] = [a, b].map(|table| table.layers().unwrap_or(&none));
+    a.differences(b)
 }
 
 impl VoxelDiff {
@@ -195,5 +208,6 @@ impl std::ops::AddAssign for VoxelDiff {
         self.to_occupied += other.to_occupied;
         self.to_free += other.to_free;
         self.changed += other.changed;
+        self.layers += other.layers;
     }
 }

@@ -9,8 +9,8 @@ use testkit::reference_map::{ReferenceMap, voxels_of};
 use testkit::unsynced_disk::UnsyncedDisk;
 use voxtile::integrity::{repair, verify};
 use voxtile::operations::{
-    Decay, Part, Prefer, Replay, ScanSelection, clear, convert, crop, decay, merge, rebuild, remove_points,
-    remove_scans,
+    Decay, Part, Prefer, Replay, ScanSelection, clear, convert, crop, decay, diff, merge, rebuild,
+    remove_points, remove_scans,
 };
 use voxtile::sensor::{Iwlo, SensorModel};
 use voxtile::{
@@ -210,6 +210,32 @@ fn operations_keep_add_and_drop_layers() {
     let left = voxels_of(&open("a"));
     let expected: LayerSums = a.into_iter().filter(|(voxel, _)| left.contains_key(voxel)).collect();
     assert!(layers_of(&open("a")) == expected);
+}
+
+#[test]
+fn diff_counts_voxels_with_other_sums() {
+    let folder = tempfile::tempdir().unwrap();
+    let scans = scans(31, 4, 80);
+    let read = |name, config: &MapConfig, scans| {
+        build(at(&folder, name), config, scans);
+        MapReader::open(at(&folder, name)).unwrap()
+    };
+    let differences = |a: &MapReader, b: &MapReader| {
+        let mut of_tiles = 0;
+        let diff = diff(a, b, |tile| of_tiles += tile.voxels.layers, |_, _| {}).unwrap();
+        assert_eq!(diff.voxels.layers, of_tiles);
+        of_tiles
+    };
+    let (sums_a, sums_b) = (naive(&config(), &scans[..3]), naive(&config(), &scans[1..]));
+    let lost = sums_a.keys().filter(|voxel| !sums_b.contains_key(voxel)).count();
+    let other = sums_b.iter().filter(|(voxel, made)| sums_a.get(voxel) != Some(made)).count();
+    assert!(lost > 0 && other > 0);
+    let a = read("a", &config(), &scans[..3]);
+    let b = read("b", &config(), &scans[1..]);
+    assert_eq!(differences(&a, &b), (lost + other) as u64);
+    assert_eq!(differences(&a, &a), 0);
+    let without = read("without", &config().with_layers(Layers::NONE), &scans);
+    assert_eq!(differences(&a, &without), 0);
 }
 
 #[test]

@@ -89,7 +89,7 @@ impl Side {
 impl Report {
     fn print(&self, out: &mut impl Write) -> std::io::Result<()> {
         let Diff { tiles_appeared, tiles_gone, tiles_changed, tiles_equal, voxels, .. } = self.diff;
-        let VoxelDiff { appeared, gone, to_occupied, to_free, changed, .. } = voxels;
+        let VoxelDiff { appeared, gone, to_occupied, to_free, changed, layers, .. } = voxels;
         writeln!(out, "from      {}", self.from.name())?;
         writeln!(out, "to        {}", self.to.name())?;
         writeln!(
@@ -107,6 +107,10 @@ impl Report {
             HumanCount(to_occupied),
             HumanCount(to_free)
         )?;
-        writeln!(out, "changed   {} in value only", HumanCount(changed))
+        writeln!(out, "changed   {} in value only", HumanCount(changed))?;
+        if layers > 0 {
+            writeln!(out, "layers    {} with other sums", HumanCount(layers))?;
+        }
+        Ok(())
     }
 }

@@ -125,6 +125,14 @@ impl LayerTable {
         });
     }
 
+    /// Returns the number of voxels that only one of the tables has, or with other sums.
+    pub(crate) fn differences(&self, other: &Self) -> u64 {
+        let mut count = 0;
+        self.for_each(|voxel, made| count += u64::from(other.get(voxel).as_ref() != Some(&made)));
+        other.for_each(|voxel, _| count += u64::from(self.get(voxel).is_none()));
+        count
+    }
+
     /// Returns whether both have the same layers of the same voxels.
     pub(crate) fn is_same(&self, other: &Self) -> bool {
         let mut is_same = self.layers == other.layers && self.masks().eq(other.masks());
