@@ -1,5 +1,6 @@
 use crate::cli::{failure, json, output, text};
-use std::collections::BTreeMap;
+use serde_json::Value;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
 use tempfile::TempDir;
@@ -221,4 +222,133 @@ fn remap_gives_another_map_the_layers_that_its_scans_hold() {
     let (code, message) = failure(&["build", text(&clouds), "-o", &bare, "--append", "--layers", "shape"]);
     assert_eq!(code, 2, "{message}");
     assert!(message.contains("remap MAP -o NEW") && message.contains("--layers"), "{message}");
+}
+
+/// Converts linear light to a channel of an sRGB colour.
+fn srgb_of(linear: u16) -> u8 {
+    let share = f64::from(linear) / 65_535.0;
+    let channel = if share <= 0.003_130_8 { 12.92 * share } else { 1.055 * share.powf(1.0 / 2.4) - 0.055 };
+    (255.0 * channel).round() as u8
+}
+
+/// Returns the colours of the faces of a mesh of 3D Tiles, by voxel of the node.
+fn face_colours(mesh: &Path) -> BTreeSet<(Voxel, [u8; 3])> {
+    let bytes = fs::read(mesh).unwrap();
+    let head_bytes = u32::from_le_bytes(bytes[12..16].try_into().unwrap()) as usize;
+    let head: Value = serde_json::from_slice(&bytes[20..20 + head_bytes]).unwrap();
+    let (colour, views) = (&head["accessors"][1], &head["bufferViews"]);
+    assert_eq!((&colour["componentType"], &colour["normalized"]), (&5123.into(), &true.into()));
+    let number = |value: &Value| value.as_u64().unwrap() as usize;
+    let (stride, colour_at) = (number(&views[0]["byteStride"]), number(&colour["byteOffset"]));
+    let node = &head["nodes"][0];
+    let [x, y, z] = [0, 1, 2].map(|k| node["translation"][k].as_f64().unwrap());
+    let edge_m = node["scale"][0].as_f64().unwrap();
+    let binary = &bytes[20 + head_bytes + 8..];
+    let vertices = binary[..stride * number(&colour["count"])].chunks_exact(stride).map(|vertex| {
+        let short = |at: usize| u16::from_le_bytes([vertex[at], vertex[at + 1]]);
+        let along = |k: usize, from_m: f64| (from_m / edge_m).round() as i64 + i64::from(short(2 * k));
+        let [red, green, blue, alpha] = [0, 1, 2, 3].map(|k| short(colour_at + 2 * k));
+        assert_eq!(alpha, u16::MAX);
+        // glTF has y up: y of the map is -z.
+        ([along(0, x), -along(2, z), along(1, y)], [red, green, blue].map(srgb_of))
+    });
+    let mut faces = BTreeSet::new();
+    for quad in vertices.collect::<Vec<_>>().chunks_exact(4) {
+        let (a, b, c) = (quad[0].0, quad[1].0, quad[2].0);
+        assert!(quad.iter().all(|(_, colour)| *colour == quad[0].1), "{quad:?}");
+        let (u, v): (Voxel, Voxel) = ([0, 1, 2].map(|k| b[k] - a[k]), [0, 1, 2].map(|k| c[k] - b[k]));
+        // The cells of the face are inside, so below its upper side.
+        let [xs, ys, zs] = [0, 1, 2].map(|k| {
+            let (next, last) = ((k + 1) % 3, (k + 2) % 3);
+            match u[next] * v[last] - u[last] * v[next] {
+                0 => a[k].min(c[k])..a[k].max(c[k]),
+                normal => a[k] - i64::from(normal > 0)..a[k] + i64::from(normal < 0),
+            }
+        });
+        for (x, y) in xs.flat_map(|x| ys.clone().map(move |y| (x, y))) {
+            faces.extend(zs.clone().map(|z| ([x, y, z], quad[0].1)));
+        }
+    }
+    faces
+}
+
+#[test]
+fn meshes_of_3d_tiles_have_mean_colours_at_every_level() {
+    const TILE_EDGE: i64 = 16;
+    let folder = TempDir::new().unwrap();
+    // A floor two voxels high, so that every voxel has a free face at every level. All points of some voxels have no
+    // colour.
+    let (mut points, mut rows) = (Vec::new(), String::from("x,y,z,r,g,b\n"));
+    for k in 0..4000_i64 {
+        let voxel = [(k * 7) % 50 - 20, (k * 11) % 23 - 9, k % 2];
+        let is_coloured = (voxel[0] + voxel[1]) % 5 != 0;
+        let colour = if voxel[0] < 4 { [250, 20, 10] } else { [k % 256, k / 3 % 256, 9] };
+        let [x, y, z] = voxel.map(|at| (at as f64 + 0.5) * EDGE_M);
+        let [red, green, blue] = if is_coloured { colour } else { [-1; 3] };
+        rows += &format!("{x},{y},{z},{red},{green},{blue}\n");
+        points.push((voxel, is_coloured.then_some(colour)));
+    }
+    let cloud = folder.path().join("floor.csv");
+    fs::write(&cloud, rows).unwrap();
+    let build = |name: &str, layers: &str| {
+        let map = text(&folder.path().join(name)).to_owned();
+        let options = ["--no-rays", "--resolution", "0.5", "--tile-size", "8", "--layers", layers];
+        output(&[&["build", text(&cloud), "-o", &map][..], &options].concat());
+        map
+    };
+    let (map, plain) = (build("map", "colour"), build("plain", "none"));
+    let tiles = |map: &str, name: &str, options: &[&str]| {
+        exported(map, &folder.path().join(name), &[&["--format", "3dtiles"], options].concat())
+    };
+    let meshes = |tiles: &Path| {
+        let mut meshes: Vec<(Vec<i64>, PathBuf)> = Vec::new();
+        let mut open = vec![tiles.join("node")];
+        while let Some(path) = open.pop() {
+            if path.is_dir() {
+                open.extend(fs::read_dir(path).unwrap().map(|entry| entry.unwrap().path()));
+                continue;
+            }
+            let key = path.with_extension("");
+            let key = key.strip_prefix(tiles.join("node")).unwrap().iter();
+            meshes.push((key.map(|part| part.to_str().unwrap().parse().unwrap()).collect(), path));
+        }
+        meshes.sort();
+        meshes
+    };
+    let coloured = meshes(&tiles(&map, "coloured", &[]));
+    let mut found: BTreeMap<i64, BTreeSet<(Voxel, [u8; 3])>> = BTreeMap::new();
+    for (key, mesh) in &coloured {
+        let first = [1, 2, 3].map(|k| key[k] * TILE_EDGE);
+        let faces = face_colours(mesh).into_iter();
+        let in_map = faces.map(|(voxel, colour)| ([0, 1, 2].map(|k| first[k] + voxel[k]), colour));
+        found.entry(key[0]).or_default().extend(in_map);
+    }
+    assert!(found.len() > 1, "{:?}", found.keys());
+    for (level, found) in found {
+        let mut sums: BTreeMap<Voxel, (i64, [i64; 3])> = BTreeMap::new();
+        for (voxel, colour) in &points {
+            let (count, sum) = sums.entry(voxel.map(|at| at >> level)).or_default();
+            if let Some(colour) = colour {
+                *count += 1;
+                (0..3).for_each(|k| sum[k] += colour[k]);
+            }
+        }
+        let mean = |(count, sum): (i64, [i64; 3])| match count {
+            0 => [128; 3],
+            count => sum.map(|sum| ((sum as f64 / count as f64).round()) as u8),
+        };
+        let expected: BTreeSet<_> = sums.into_iter().map(|(voxel, sum)| (voxel, mean(sum))).collect();
+        let is_gray = |(_, colour): &(Voxel, [u8; 3])| *colour == [128; 3];
+        assert!(level > 0 || expected.iter().any(is_gray));
+        assert!(found == expected, "level {level}: {:?}", found.symmetric_difference(&expected).next());
+    }
+    // Without the colours the files are those of a map without them.
+    let [left_out, plain] = [(&map, "left_out", &["--no-layers"][..]), (&plain, "none", &[])]
+        .map(|(map, name, options)| meshes(&tiles(map, name, options)));
+    assert_eq!((left_out.len(), plain.len()), (coloured.len(), coloured.len()));
+    for (number, (key, mesh)) in left_out.iter().enumerate() {
+        let [bytes, of_plain, of_coloured] =
+            [mesh, &plain[number].1, &coloured[number].1].map(|mesh| fs::read(mesh).unwrap());
+        assert!(bytes == of_plain && bytes != of_coloured, "{key:?}");
+    }
 }

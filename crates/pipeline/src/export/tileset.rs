@@ -10,9 +10,11 @@ use std::fs;
 use std::path::Path;
 use std::sync::atomic::{AtomicU64, Ordering};
 use voxtile::mapper::MapView;
-use voxtile::{Error, Result};
+use voxtile::{Error, Layers, Result};
 use voxtile_formats::write::{OutputFormat, RowLayers, VoxelRow, VoxelsHead, WriteOptions};
-use voxtile_render::levels::{Levels, LevelsOf, NodeKey, NodeStore, TilesetContent, subtree, tileset};
+use voxtile_render::levels::{
+    ColouredVoxel, Levels, LevelsOf, NodeKey, NodeStore, TilesetContent, subtree, tileset,
+};
 
 /// Numbers of nodes and voxels written.
 #[derive(Default)]
@@ -43,6 +45,10 @@ pub(super) fn export(export: &Export<'_>) -> anyhow::Result<ExportSummary> {
             store: &store,
             folder: &folder,
             watch,
+            layers: Layers {
+                colour: export.options.with_layers && map.config().layers().colour,
+                ..Layers::NONE
+            },
             counts: Counts::default(),
         };
         tileset.write(&|| progress.step())?;
@@ -60,6 +66,8 @@ struct Tileset<'a> {
     store: &'a NodeStore,
     folder: &'a Path,
     watch: &'a Watch,
+    /// Layers to write: colour, or none.
+    layers: Layers,
     counts: Counts,
 }
 
@@ -104,7 +112,7 @@ impl Tileset<'_> {
     }
 
     fn write_node(&self, key: NodeKey, heights_m: [f64; 2]) -> Result<()> {
-        let voxels = self.levels.voxels(self.map, self.store, key)?;
+        let voxels = self.voxels(key)?;
         let (edge_m, corner_m) = (self.levels.voxel_edge_m(key.level), self.levels.corner_m(key));
         let path = self.folder.join(format!("node/{key}.glb"));
         if let Some(folder) = path.parent() {
@@ -115,7 +123,7 @@ impl Tileset<'_> {
             resolution_m: edge_m,
             bounds_m: [[0.0; 3]; 2],
             occupied_log_odds: 0.0,
-            layers: voxtile::Layers::NONE,
+            layers: self.layers,
         };
         let mut options = WriteOptions::for_path(&path);
         // Coordinates are relative to the node's corner.
@@ -123,7 +131,7 @@ impl Tileset<'_> {
         // Viewers of 3D Tiles support quantized positions, which make the folder a fifth smaller.
         options.is_quantized = true;
         let mut sink = OutputFormat::GLB.open(&head, &path, &options)?;
-        for voxel in &voxels {
+        for &(voxel, colour) in &voxels {
             sink.put(&VoxelRow {
                 index: voxel.map(i32::from),
                 center_m: voxel.map(|k| (f64::from(k) + 0.5) * edge_m),
@@ -131,7 +139,7 @@ impl Tileset<'_> {
                 log_odds: 0.0,
                 observation_count: 0,
                 tile: [0; 3],
-                layers: RowLayers::default(),
+                layers: RowLayers { colour, ..RowLayers::NONE },
             })?;
         }
         sink.finish()?;
@@ -140,6 +148,15 @@ impl Tileset<'_> {
             self.counts.voxels.fetch_add(voxels.len() as u64, Ordering::Relaxed);
         }
         Ok(())
+    }
+
+    /// Returns the voxels of a node, with the colours to write.
+    fn voxels(&self, key: NodeKey) -> Result<Vec<ColouredVoxel>> {
+        if self.layers.colour {
+            return self.levels.coloured_voxels(self.map, self.store, key);
+        }
+        let voxels = self.levels.voxels(self.map, self.store, key)?;
+        Ok(voxels.into_iter().map(|voxel| (voxel, None)).collect())
     }
 
     /// Returns the range of heights of occupied voxels, in metres.

@@ -75,6 +75,11 @@ pub(super) fn axes(place: u32) -> [i64; 3] {
 }
 
 impl Cells {
+    /// Returns the positions of the voxels in the node.
+    pub(super) fn positions(&self) -> impl Iterator<Item = [u8; 3]> {
+        self.cells.iter().map(|cell| axes(cell.place).map(|at| at as u8))
+    }
+
     /// Returns the voxels of a kind in a node that is a tile or a part of one.
     pub(super) fn of_tile(
         scheme: Scheme,

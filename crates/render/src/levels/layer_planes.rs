@@ -27,27 +27,31 @@ pub(super) fn number_of(layer: Layer) -> u8 {
     }
 }
 
-/// Encodes the values of a layer of the voxels of a node.
-pub(super) fn encode(layer: Layer, cells: &Cells, sums: &LayerSums, layers: &Layers) -> Vec<u8> {
+/// Returns the layers of each voxel of a node; `None` where no point hit.
+fn of_cells<'a>(cells: &'a Cells, sums: &'a LayerSums) -> impl Iterator<Item = Option<&'a VoxelLayers>> {
     // Both are sorted by position.
     let mut rest = sums.voxels.iter().peekable();
-    let of_cells: Vec<Option<&VoxelLayers>> = cells
-        .cells
-        .iter()
-        .map(|cell| {
-            while rest.next_if(|(place, _)| *place < cell.place).is_some() {}
-            rest.next_if(|(place, _)| *place == cell.place).map(|(_, voxel)| voxel)
-        })
-        .collect();
+    cells.cells.iter().map(move |cell| {
+        while rest.next_if(|(place, _)| *place < cell.place).is_some() {}
+        rest.next_if(|(place, _)| *place == cell.place).map(|(_, voxel)| voxel)
+    })
+}
+
+/// Returns the mean colour of each voxel of a node.
+pub(super) fn colours(cells: &Cells, sums: &LayerSums) -> Vec<Option<[u8; 3]>> {
+    of_cells(cells, sums).map(|voxel| voxel.and_then(VoxelLayers::mean_colour)).collect()
+}
+
+/// Encodes the values of a layer of the voxels of a node.
+pub(super) fn encode(layer: Layer, cells: &Cells, sums: &LayerSums, layers: &Layers) -> Vec<u8> {
     if layer == Layer::Colour {
-        let colours: Vec<Option<[u8; 3]>> =
-            of_cells.iter().map(|voxel| voxel.and_then(VoxelLayers::mean_colour)).collect();
+        let colours = colours(cells, sums);
         let plane = |k: usize| colours.iter().map(move |colour| colour.map_or(0, |colour| colour[k]));
         let is_there = colours.iter().map(|colour| if colour.is_some() { 255 } else { 0 });
         return plane(0).chain(plane(1)).chain(plane(2)).chain(is_there).collect();
     }
     let values: Vec<Option<f64>> =
-        of_cells.iter().map(|voxel| voxel.and_then(|voxel| value_of(layer, voxel, layers))).collect();
+        of_cells(cells, sums).map(|voxel| voxel.and_then(|voxel| value_of(layer, voxel, layers))).collect();
     let [least, most] = match layer {
         Layer::Class => [0.0, MOST - 1.0],
         Layer::Intensity => [0.0, f64::from(layers.intensity_max.unwrap_or(1.0))],

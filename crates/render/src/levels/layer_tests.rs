@@ -80,6 +80,15 @@ fn values_of(
         }
     };
     assert_eq!(values.len(), if layer == Layer::Colour { 4 * count } else { 16 + 2 * count });
+    if layer == Layer::Colour {
+        let of_voxels = levels.coloured_voxels(map, store, key).unwrap().into_iter();
+        let (voxels, colours): (Vec<_>, Vec<_>) = of_voxels.unzip();
+        assert_eq!(voxels, levels.voxels(map, store, key).unwrap());
+        let colours = colours.into_iter().map(|colour| {
+            colour.map(|[red, green, blue]| f64::from(u32::from_be_bytes([0, red, green, blue])))
+        });
+        assert!(colours.eq((0..count).map(value)));
+    }
     let voxel = |place: u32| {
         let at = cells::axes(place);
         [0, 1, 2].map(|k| first[k] + (at[k] << key.level))
@@ -155,6 +164,7 @@ fn a_map_without_the_layer_is_refused() {
     let levels = Levels::build(&map, &map.tile_indices(), 0, &store, &|_| true).unwrap().unwrap();
     let key = NodeKey { level: 0, index: [0; 3] };
     assert!(levels.layered_node(&map, &store, key, Layer::Class).is_err());
+    assert!(levels.coloured_voxels(&map, &store, key).is_err());
     assert_eq!(levels.layer_totals(&map, &store).unwrap(), LayerTotals::default());
     let map = map_of(20, &[]);
     let levels = Levels::build(&map, &map.tile_indices(), 0, &store, &|_| true).unwrap().unwrap();

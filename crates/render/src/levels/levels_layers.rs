@@ -1,6 +1,6 @@
 //! Layers of the nodes of a map. Coarse nodes are stored with the sums of their layers, those of tiles on request.
 
-use super::cells::Kind;
+use super::cells::{Cells, Kind};
 use super::layer_planes;
 use super::layer_sums::LayerSums;
 use super::layer_totals::LayerTotals;
@@ -16,6 +16,9 @@ use voxtile::space::TileIndex;
 /// Combined with the version of a node, gives that of its layers. Change it when sums are computed or encoded
 /// differently.
 const LAYERS_FORMAT: u64 = 0x6c61_7965_7273_0001;
+
+/// Position of a voxel in its node, as in [`Levels::voxels`], and its mean colour.
+pub type ColouredVoxel = ([u8; 3], Option<[u8; 3]>);
 
 impl Levels {
     pub(super) fn has_layers(&self) -> bool {
@@ -66,14 +69,43 @@ impl Levels {
         layer.check(&self.config.layers())?;
         let Some(bytes) = self.node(map, store, key, Kind::Occupied)? else { return Ok(None) };
         let cells = node_bytes::decode(&bytes).or_else(|_| self.cells(map, store, key))?;
-        let sums = match self.scheme.tile_of(key) {
-            _ if cells.cells.is_empty() => LayerSums::default(),
-            Some(tile) => self.layers_of_tile_node(map, store, key, tile)?,
-            None => self.content(map, store, key, true)?.1,
-        };
+        let sums = self.layers_of_cells(map, store, key, &cells)?;
         let values = layer_planes::encode(layer, &cells, &sums, &self.config.layers());
         let head = self.head(key, Kind::Occupied);
         Ok(Some(node_bytes::encode_layered(&head, &cells, layer_planes::number_of(layer), &values)))
+    }
+
+    /// Returns the voxels of a node as [`Levels::voxels`] does, with their mean colours; `None` for voxels without one.
+    ///
+    /// # Errors
+    ///
+    /// [`InvalidArgument`](voxtile::Error::InvalidArgument) if the map has no colours. Fails if a tile or the store
+    /// cannot be read.
+    pub fn coloured_voxels<V: MapView>(
+        &self,
+        map: &V,
+        store: &NodeStore,
+        key: NodeKey,
+    ) -> Result<Vec<ColouredVoxel>> {
+        Layer::Colour.check(&self.config.layers())?;
+        let cells = self.cells(map, store, key)?;
+        let sums = self.layers_of_cells(map, store, key, &cells)?;
+        Ok(cells.positions().zip(layer_planes::colours(&cells, &sums)).collect())
+    }
+
+    /// Returns the layers of the occupied voxels of a node.
+    fn layers_of_cells<V: MapView>(
+        &self,
+        map: &V,
+        store: &NodeStore,
+        key: NodeKey,
+        cells: &Cells,
+    ) -> Result<LayerSums> {
+        match self.scheme.tile_of(key) {
+            _ if cells.cells.is_empty() => Ok(LayerSums::default()),
+            Some(tile) => self.layers_of_tile_node(map, store, key, tile),
+            None => Ok(self.content(map, store, key, true)?.1),
+        }
     }
 
     /// Returns the layers of a tile or of a part of one. Stores those of all nodes of the tile, because a viewer that

@@ -1,4 +1,4 @@
-use super::cells::{Cells, Kind, Scale, axes};
+use super::cells::{Cells, Kind, Scale};
 use super::layer_sums::{CollectedSums, LayerSums};
 use super::node_bytes::{self, Head};
 use super::node_key::{MAX_LEVEL, NodeKey};
@@ -367,8 +367,7 @@ impl Levels {
     ///
     /// Fails if a tile or the store cannot be read.
     pub fn voxels<V: MapView>(&self, map: &V, store: &NodeStore, key: NodeKey) -> Result<Vec<[u8; 3]>> {
-        let cells = self.cells(map, store, key)?.cells;
-        Ok(cells.iter().map(|cell| axes(cell.place).map(|at| at as u8)).collect())
+        Ok(self.cells(map, store, key)?.positions().collect())
     }
 
     /// Returns whether a node is a tile.

@@ -38,6 +38,7 @@ mod tests;
 pub use cells::Kind;
 pub use difference::Difference;
 pub use layer_totals::LayerTotals;
+pub use levels_layers::ColouredVoxel;
 pub use levels_of_map::Levels;
 pub use node_key::NodeKey;
 pub use node_store::NodeStore;
