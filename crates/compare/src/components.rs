@@ -2,6 +2,7 @@ use crate::bits::{Bits, Run};
 use crate::blocks::Cube;
 use crate::sets::Sets;
 use rustc_hash::FxHashMap;
+use std::collections::hash_map::Entry;
 use voxtile::mapper::MapView;
 use voxtile::{Result, VoxelIndex, VoxelLayers};
 
@@ -160,10 +161,11 @@ impl Components {
         let voxels: Vec<_> = self.voxels().collect();
         for (voxel, part) in voxels {
             let index = grid.tile_of_voxel(voxel);
-            if !tiles.contains_key(&index) {
-                tiles.insert(index, map.tile_uncached(index)?);
-            }
-            let layers = tiles.get(&index).and_then(|tile| tile.as_ref()?.layers_of(voxel));
+            let tile = match tiles.entry(index) {
+                Entry::Occupied(entry) => entry.into_mut(),
+                Entry::Vacant(entry) => entry.insert(map.tile_uncached(index)?),
+            };
+            let layers = tile.as_ref().and_then(|tile| tile.layers_of(voxel));
             if let Some(layers) = layers {
                 self.parts[part as usize].add_layers(&layers);
             }
