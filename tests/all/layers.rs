@@ -15,7 +15,7 @@ use voxtile::operations::{
 use voxtile::sensor::{Iwlo, SensorModel};
 use voxtile::{
     Aabb, Error, InMemoryMapper, InsertMode, Layers, MapConfig, MapPath, MapQueries, MapReader, MapView,
-    Mapper, OutOfCoreTileMapper, ScanPoints, Stop, Storage, TileBox, VoxelIndex,
+    Mapper, OutOfCoreTileMapper, PointAttributes, ScanPoints, Stop, Storage, TileBox, VoxelIndex,
 };
 
 fn scans(seed: u64, count: usize, points: usize) -> Vec<AttributedScan> {
@@ -218,7 +218,7 @@ fn diff_counts_voxels_with_other_sums() {
     let scans = scans(31, 4, 80);
     let read = |name, config: &MapConfig, scans| {
         build(at(&folder, name), config, scans);
-        MapReader::open(at(&folder, name)).unwrap()
+        MapReader::open(at(&folder, name), 1 << 20).unwrap()
     };
     let differences = |a: &MapReader, b: &MapReader| {
         let mut of_tiles = 0;
@@ -227,8 +227,8 @@ fn diff_counts_voxels_with_other_sums() {
         of_tiles
     };
     let (sums_a, sums_b) = (naive(&config(), &scans[..3]), naive(&config(), &scans[1..]));
-    let lost = sums_a.keys().filter(|voxel| !sums_b.contains_key(voxel)).count();
-    let other = sums_b.iter().filter(|(voxel, made)| sums_a.get(voxel) != Some(made)).count();
+    let lost = sums_a.keys().filter(|voxel| !sums_b.contains_key(*voxel)).count();
+    let other = sums_b.iter().filter(|(voxel, made)| sums_a.get(*voxel) != Some(made)).count();
     assert!(lost > 0 && other > 0);
     let a = read("a", &config(), &scans[..3]);
     let b = read("b", &config(), &scans[1..]);
@@ -312,7 +312,7 @@ fn rebuilt_maps_get_the_layers_that_kept_scans_fill() {
     let all = MapReader::open(at(&folder, "all"), 0).unwrap();
     assert!(layers_of(&all) == naive(&config, &scans));
     let without =
-        |lacks: &dyn Fn(&Attributed) -> bool| scans.iter().filter(|scan| lacks(scan)).count() as u64;
+        |lacks: &dyn Fn(&AttributedScan) -> bool| scans.iter().filter(|scan| lacks(scan)).count() as u64;
     let expected = [
         ("colour", without(&|scan| scan.attributes.colours.is_empty())),
         ("intensity", 0),
