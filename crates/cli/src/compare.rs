@@ -135,7 +135,7 @@ impl Report {
         let tolerance = Counted(u64::from(comparison.tolerance_voxels), "voxel");
         let tolerance_m = f64::from(comparison.tolerance_voxels) * self.resolution_m;
         writeln!(out, "tolerance {tolerance} ({tolerance_m:.3} m)\n")?;
-        writeln!(out, "occupied voxels       before             after")?;
+        writeln!(out, "{:<10} {:>19} {:>19}", "occupied", "before", "after")?;
         type Count = fn(&EpochCounts) -> u64;
         let rows: [(&str, Count); 5] = [
             ("all", |counts| counts.occupied),
@@ -146,7 +146,8 @@ impl Report {
         ];
         for (name, count) in rows {
             let [before, after] = [&comparison.before, &comparison.after].map(|counts| {
-                format!("{:>11} {:>5.1} %", HumanCount(count(counts)), percent(count(counts), counts))
+                let voxels = HumanCount(count(counts)).to_string();
+                format!("{voxels:>11} {:>5.1} %", percent(count(counts), counts))
             });
             writeln!(out, "{name:<10} {before} {after}")?;
         }
