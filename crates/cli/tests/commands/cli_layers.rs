@@ -99,8 +99,11 @@ fn exported_points_can_be_mapped_with_their_layers() {
         #[cfg(feature = "las")]
         ("laz", &colours),
     ];
+    // Poses are looked for in the folder above, too.
+    let files = folder.path().join("files");
+    fs::create_dir(&files).unwrap();
     for (extension, names) in formats {
-        let file = exported(&map, &folder.path().join(format!("b.{extension}")), &[]);
+        let file = exported(&map, &files.join(format!("b.{extension}")), &[]);
         let again = folder.path().join(format!("of_{extension}"));
         let options = ["--no-rays", "--resolution", "0.5", "--layers", "colour,intensity,class"];
         output(&[&["build", text(&file), "-o", text(&again)][..], &options].concat());
@@ -288,7 +291,9 @@ fn meshes_of_3d_tiles_have_mean_colours_at_every_level() {
         rows += &format!("{x},{y},{z},{red},{green},{blue}\n");
         points.push((voxel, is_coloured.then_some(colour)));
     }
-    let cloud = folder.path().join("floor.csv");
+    // Poses are looked for in the folder above, too.
+    let cloud = folder.path().join("clouds").join("floor.csv");
+    fs::create_dir(folder.path().join("clouds")).unwrap();
     fs::write(&cloud, rows).unwrap();
     let build = |name: &str, layers: &str| {
         let map = text(&folder.path().join(name)).to_owned();
