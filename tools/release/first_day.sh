@@ -16,8 +16,7 @@ release=$(realpath "$1")
 repository=$(realpath "$(dirname "$0")/../..")
 data=$(realpath "${VOXTILE_DATA:-$repository/../shared/data}")
 work=$(mktemp -d)
-servers=()
-trap 'for one in "${servers[@]}"; do kill "$one" 2>/dev/null || true; done; rm -rf "$work"' EXIT
+trap 'rm -rf "$work"' EXIT
 cd "$work"
 
 tar --extract --gzip --strip-components 1 --file "$release"/voxtile-*-"$(uname -m)"-unknown-linux-gnu.tar.gz
@@ -110,7 +109,6 @@ planner() {
 operator() {
     environment store 'moto[s3,server]==5.2.5'
     "$work/store/bin/moto_server" -H 127.0.0.1 -p 5055 >moto.log 2>&1 &
-    servers+=($!)
     export AWS_ACCESS_KEY_ID=a AWS_SECRET_ACCESS_KEY=b AWS_REGION=us-east-1 AWS_ENDPOINT=http://127.0.0.1:5055
     export AWS_ALLOW_HTTP=true
     until_it curl --silent --fail -X PUT http://127.0.0.1:5055/fleet
@@ -118,7 +116,7 @@ operator() {
     test "$(voxtile digest s3://fleet/robot)" = "$(voxtile digest street)"
     cp -r street damaged
     local tile
-    tile=$(find damaged -name 'iwlo_meta.bin' -o -name 'tile.vxt' | head -n 1)
+    tile=$(find damaged \( -name iwlo_meta.bin -o -name tile.vxt \) -print -quit)
     printf 'x' | dd of="$tile" bs=1 seek=100 conv=notrunc status=none
     if voxtile verify damaged; then return 1; fi
     voxtile repair damaged || test $? -eq 1
@@ -130,7 +128,6 @@ looker() {
     voxtile picture street -o street.png
     voxtile report street -o street.html
     voxtile view street --no-browser --listen 127.0.0.1:5056 --token first_day &
-    servers+=($!)
     until_it curl --silent --fail http://127.0.0.1:5056/first_day/
     curl --silent --fail http://127.0.0.1:5056/first_day/metrics | grep -q '^voxtile_'
 }
@@ -147,9 +144,9 @@ for way in first_map robot ros surveyor notebook octomap planner operator looker
         continue
     fi
     began=$SECONDS
-    # A subshell of its own, in which the first error ends the way.
+    # A subshell, in which the first error ends the way. Servers end with it.
     set +e
-    (set -e; $way) >"$way.log" 2>&1
+    (set -e; trap 'kill $(jobs -p) 2>/dev/null || true' EXIT; $way) >"$way.log" 2>&1
     status=$?
     set -e
     if [[ $status -eq 0 ]]; then
