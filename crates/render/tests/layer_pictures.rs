@@ -101,7 +101,7 @@ fn classes_have_fixed_colors() {
 }
 
 #[test]
-fn intensities_are_drawn_from_the_2nd_to_the_98th_percentile() {
+fn intensities_are_drawn_between_two_percentiles() {
     let map = map_of(ALL, &scene());
     let drawn = draw(&plain(Layer::Intensity), &map);
     let [least, most] = drawn.range.unwrap();
