@@ -1,4 +1,4 @@
-//! Changes between two maps of one place, and what was not seen.
+//! Compares two maps of one place: which voxels vanished or appeared, and which the other map has not observed.
 //!
 //! A map knows free, occupied and unknown voxels. So a surface of the earlier map has *vanished* only if the later map
 //! saw through its place and around it, and is *not seen* where the later map has no observation.

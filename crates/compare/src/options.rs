@@ -15,8 +15,8 @@ pub struct CompareOptions {
     pub tolerance_m: Option<f64>,
     /// Voxels of the smallest cluster that is listed. Default: 8.
     pub min_voxels: u64,
-    /// Probability, above 0.5 and below 1, that both maps need for a change: the one that the voxel is occupied, the
-    /// other that it is free. Changes with less evidence are uncertain. Default: 0.7.
+    /// Probability, above 0.5 and below 1. A voxel has changed if it is occupied in one map and free in the other, each
+    /// with at least this probability; with less, the change is uncertain. Default: 0.7.
     pub certainty: f64,
     /// Box in metres: only voxels whose center is inside are compared. Default: all.
     pub region: Option<Aabb>,
