@@ -55,7 +55,9 @@ SOURCE_DATE_EPOCH=$(git log -1 --format=%ct)
 export SOURCE_DATE_EPOCH
 
 work=$(mktemp -d)
-trap 'rm -rf "$work" python/*LICENSE*' EXIT
+# cargo-cyclonedx writes a list beside each manifest of the workspace.
+remove_boms() { rm -f sbom.tmp.json {crates/*,tools/*,python}/sbom.tmp.json; }
+trap 'rm -rf "$work" python/*LICENSE*; remove_boms' EXIT
 mkdir "$work/out"
 
 tools=$built/release_tools
@@ -150,6 +152,7 @@ boms() {
         cargo cyclonedx --quiet --format json --spec-version 1.5 --target "$1-unknown-linux-gnu" "${selected[@]}" \
             --manifest-path "crates/$package/Cargo.toml" --override-filename sbom.tmp
         mv "crates/$package/sbom.tmp.json" "$work/out/voxtile-$package-$version-$1.cdx.json"
+        remove_boms
     done
 }
 
