@@ -172,6 +172,12 @@ impl Grid {
         point.iter().all(|&x| is_in_range(x)).then(|| point.map(floor))
     }
 
+    /// The voxel of a point in units of voxels, whose index is known to fit.
+    #[inline]
+    pub(crate) fn voxel_of_fitting_units(point: Point) -> VoxelIndex {
+        point.map(floor)
+    }
+
     /// The tile that contains a voxel.
     #[inline]
     pub fn tile_of_voxel(&self, voxel: VoxelIndex) -> TileIndex {

@@ -4,11 +4,12 @@
 use super::scan_rays::{ScanRays, is_set, part_of};
 use crate::config::Layers;
 use crate::error::Result;
+use crate::scan::ray::RayEnd;
 use crate::scan::spill::Overflow;
 use crate::scan::updates::{
     LayerHit, LayerHits, MappedTiles, OFFSETS_PER_VOXEL, ScanUpdates, TileUpdates, in_order_of_tiles,
 };
-use crate::scan::{ChunkMarks, PackedUpdates, PointFrame, ScanReport};
+use crate::scan::{AttributeSlices, ChunkMarks, PackedUpdates, PointFrame, ScanReport};
 use crate::space::{Point, TileIndex, VoxelBox, VoxelIndex};
 use rayon::prelude::*;
 use rustc_hash::FxHashMap;
@@ -69,16 +70,20 @@ impl ScanRays<'_> {
             range,
             PointFrame::World,
             &mut |points, intensities, attributes| {
+                let attributes = AttributeSlices {
+                    colours: if hits.layers.colour { attributes.colours } else { &[] },
+                    classes: if hits.layers.class { attributes.classes } else { &[] },
+                };
                 let is_moving = marks.next(points.len());
                 for (number, &point) in points.iter().enumerate() {
                     let intensity = intensities.map_or(f32::NAN, |intensities| intensities[number]);
                     let of_ray = if intensities.is_some() { intensity } else { 0.0 };
-                    let end = self.ray(point, of_ray, is_set(is_moving, number), &mut report);
-                    if let Some(end) = end.filter(|end| end.hit.is_some()) {
-                        hits.push(end.point, end.voxel, |layers| LayerHit {
+                    let end = self.end(point, of_ray, is_set(is_moving, number), &mut report);
+                    if let Some(RayEnd { point, voxel, hit: Some(_), .. }) = end {
+                        hits.push(point, voxel, |layers| LayerHit {
                             intensity: layers.stored_intensity(intensity),
-                            colour: attributes.colour(number).filter(|_| layers.colour),
-                            class: attributes.class(number).filter(|_| layers.class),
+                            colour: attributes.colour(number),
+                            class: attributes.class(number),
                             ..LayerHit::default()
                         });
                     }

@@ -14,9 +14,9 @@ use crate::scan::scan_points::ScanPoints;
 use crate::scan::spill::ScanParts;
 use crate::scan::stop::Stop;
 use crate::scan::updates::{MappedTiles, ScanUpdates};
-use crate::scan::{ChunkMarks, ScanReport};
+use crate::scan::{ChunkMarks, ScanReport, SkippedPoints};
 use crate::sensor::{Observation, SensorModel};
-use crate::space::{Grid, Point, TileSelection};
+use crate::space::{Grid, Point, TileSelection, VoxelIndex};
 use rayon::prelude::*;
 use std::ops::Range;
 
@@ -40,6 +40,8 @@ pub(crate) struct ScanRays<'a> {
     clearance: Option<Clearance>,
     window: Window,
     range: RangeRule,
+    /// Whether voxel indices of all points fit, and no ray is too long.
+    all_in_reach: bool,
     /// Maximum number of threads.
     max_threads: usize,
     stop: &'a Stop,
@@ -83,10 +85,13 @@ impl<'a> ScanRays<'a> {
             clearance,
             window,
             range,
+            all_in_reach: false,
             max_threads,
             stop,
         };
-        scan_rays.window = Window::around(voxel, scan_rays.bounds()?);
+        let bounds = scan_rays.bounds()?;
+        scan_rays.window = Window::around(voxel, bounds);
+        scan_rays.all_in_reach = is_in_reach(voxel, bounds);
         Ok(scan_rays)
     }
 
@@ -403,7 +408,17 @@ impl<'a> ScanRays<'a> {
     /// Returns the end of the ray to a point; `None` if the point is skipped or its ray crosses no mapped tile. A point
     /// that is marked as moving is no hit.
     #[inline]
-    pub(super) fn ray(
+    fn ray(&self, point: Point, intensity: f32, is_moving: bool, report: &mut ScanReport) -> Option<RayEnd> {
+        let end = self.end(point, intensity, is_moving, report)?;
+        match &self.cut {
+            None => Some(end),
+            Some(cut) => cut.apply(&self.origin, end),
+        }
+    }
+
+    /// Like [`Self::ray`], but of the whole ray, whatever tiles are mapped.
+    #[inline(always)]
+    pub(super) fn end(
         &self,
         point: Point,
         intensity: f32,
@@ -424,24 +439,40 @@ impl<'a> ScanRays<'a> {
             Ranged::Skipped => return None,
         };
         let end = self.mapped.grid.to_voxel_units(end_m);
+        let last = match self.all_in_reach {
+            true => Grid::voxel_of_fitting_units(end),
+            false => self.checked_voxel(end, skipped)?,
+        };
+        report.cut_at_max_range += u64::from(!is_hit);
+        let hit = Observation::Hit(intensity);
+        let hit = (is_hit && !is_moving && self.model.is_evidence(hit)).then_some(intensity);
+        Some(RayEnd { point: end, voxel: last, hit, span: SlabSpan::WHOLE })
+    }
+
+    /// The voxel in which a ray ends; `None` if its index does not fit, or the ray is too long.
+    #[cold]
+    fn checked_voxel(&self, end: Point, skipped: &mut SkippedPoints) -> Option<VoxelIndex> {
         let Some(last) = Grid::voxel_of_units(end) else {
             skipped.out_of_range += 1;
             return None;
         };
         let steps: u64 = (0..3).map(|k| u64::from(self.origin.voxel[k].abs_diff(last[k]))).sum();
-        if steps > MAX_RAY_STEPS {
-            skipped.ray_too_long += 1;
-            return None;
-        }
-        report.cut_at_max_range += u64::from(!is_hit);
-        let hit = Observation::Hit(intensity);
-        let hit = (is_hit && !is_moving && self.model.is_evidence(hit)).then_some(intensity);
-        let end = RayEnd { point: end, voxel: last, hit, span: SlabSpan::WHOLE };
-        match &self.cut {
-            None => Some(end),
-            Some(cut) => cut.apply(&self.origin, end),
-        }
+        skipped.ray_too_long += u64::from(steps > MAX_RAY_STEPS);
+        (steps <= MAX_RAY_STEPS).then_some(last)
     }
+}
+
+/// Returns whether the indices of all voxels in bounds, in units of voxels, fit, and no ray to them is too long.
+fn is_in_reach(origin: VoxelIndex, (low, high): (Point, Point)) -> bool {
+    // More than the rounding error of a point that was clipped at the max range.
+    const MARGIN: f64 = 2.0;
+    let farthest = |k: usize| {
+        let origin = f64::from(origin[k]);
+        (high[k] - origin).max(origin - low[k]) + MARGIN
+    };
+    let limit = f64::from(i32::MAX) - MARGIN;
+    (0..3).map(farthest).sum::<f64>() <= MAX_RAY_STEPS as f64
+        && low.iter().chain(&high).all(|&coordinate| coordinate.abs() < limit)
 }
 
 /// Returns the bounds of points that are all finite; `None` if one is not. Processes two points at a time, for vector

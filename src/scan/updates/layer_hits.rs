@@ -63,6 +63,11 @@ impl LayerHits {
         self.hits.iter()
     }
 
+    /// The hits, consecutive ones of the same voxel and class together.
+    pub(crate) fn runs(&self) -> impl Iterator<Item = &[LayerHit]> {
+        self.hits.chunk_by(|a, b| a.voxel == b.voxel && a.class == b.class)
+    }
+
     /// Number of hits.
     pub fn len(&self) -> usize {
         self.hits.len()

@@ -1,5 +1,7 @@
+use super::hit_run::HitRun;
 use super::layered_brick::LayeredBrick;
-use super::voxel_layers::VoxelLayers;
+use super::row::Row;
+use super::voxel_layers::{ClassVotes, VoxelLayers};
 use crate::config::Layers;
 use crate::scan::LayerHits;
 use crate::space::{BrickCode, BrickMask, MortonCode, VoxelIndex, VoxelKey, place_of_voxel};
@@ -58,7 +60,8 @@ impl LayerTable {
         let layers = self.layers;
         // Neighboring points mostly hit the same brick.
         let (mut last, mut number, mut bytes_before) = (None, 0, 0);
-        for hit in hits.iter() {
+        for run in hits.runs() {
+            let Some(hit) = run.first() else { continue };
             let offset = hit.voxel_offset();
             let key: [u16; 3] = std::array::from_fn(|k| first[k].wrapping_add(offset[k] as u16));
             let corner = key.map(|k| k / 8);
@@ -71,7 +74,8 @@ impl LayerTable {
                 bytes_before = self.bricks[number].1.heap_bytes();
             }
             let place = place_of_voxel(key.map(i32::from));
-            self.bricks[number].1.add(place, hit, hits.stamp_ns, &layers);
+            let run = HitRun::of(run, &layers);
+            self.bricks[number].1.add(place, &run, hits.stamp_ns, &layers);
         }
         if last.is_some() {
             self.note_grown(number, bytes_before);
@@ -98,6 +102,12 @@ impl LayerTable {
         for (code, brick) in self.in_order() {
             brick.for_each(&self.layers, |place, made| visit(code.voxel(place), made));
         }
+    }
+
+    /// Visits the rows of the hit voxels in Morton order, each in its one form, with the base of its times and the votes
+    /// for other classes than the main one.
+    pub(crate) fn for_each_row(&self, mut visit: impl FnMut(&Row, i64, &[ClassVotes])) {
+        self.in_order().for_each(|(_, brick)| brick.for_each_row(&self.layers, &mut visit));
     }
 
     /// The bricks with hit voxels in Morton order, with the masks of these.

@@ -1,10 +1,8 @@
+use super::hit_run::HitRun;
 use super::packed_rows::PackedRows;
-use super::row::{
-    CLASS, INTENSITY, OFFSETS, OUTVOTED, POINTS, PRODUCTS, RED, Row, SQUARES, UNCOLOURED, UNMEASURED,
-};
+use super::row::{CLASS, INTENSITY, OUTVOTED, POINTS, RED, Row, SQUARES, UNCOLOURED, UNMEASURED};
 use super::voxel_layers::{ClassVotes, TimeSpan, VoxelLayers};
 use crate::config::Layers;
-use crate::scan::{LayerHit, unzigzag, zigzag};
 use crate::space::{BrickMask, add_to_mask, is_in_mask, places};
 
 /// Layers of the hit voxels of a brick.
@@ -12,6 +10,8 @@ use crate::space::{BrickMask, add_to_mask, is_in_mask, places};
 pub(super) struct LayeredBrick {
     /// Voxels that were hit.
     mask: BrickMask,
+    /// Number of voxels in the words of the mask before each word.
+    before: [u16; 8],
     /// One row per hit voxel, in the order of the mask.
     rows: PackedRows,
     /// Times are relative to this one: the first that the brick got.
@@ -42,12 +42,66 @@ impl LayeredBrick {
         Some(self.rows.get(number).to_layers(self.base(), layers, self.others_of(place)))
     }
 
-    /// Adds a point to the voxel at a position.
+    /// Adds points to the voxel at a position.
     #[inline]
-    pub(super) fn add(&mut self, place: usize, hit: &LayerHit, stamp_ns: Option<i64>, layers: &Layers) {
+    pub(super) fn add(&mut self, place: usize, run: &HitRun, stamp_ns: Option<i64>, layers: &Layers) {
+        // Other layers than these are no sums, or have a sign.
+        let has_only_sums = !layers.time && !layers.shape;
+        if !has_only_sums || !self.add_packed(place, run, layers) {
+            self.add_to_row(place, run, stamp_ns, layers);
+        }
+    }
+
+    /// Adds points to the packed integers; returns `false`, with these unchanged, if that is not possible.
+    #[inline]
+    fn add_packed(&mut self, place: usize, run: &HitRun, layers: &Layers) -> bool {
+        let number = self.rank(place);
+        let is_new = !is_in_mask(&self.mask, place);
+        let Some(mut summand) = self.rows.summand() else { return false };
+        summand.include(POINTS, run.points);
+        if layers.colour {
+            summand.include(UNCOLOURED, run.uncoloured);
+            (0..3).for_each(|k| summand.include(RED + k, run.colour[k]));
+        }
+        if layers.intensity_max.is_some() {
+            summand.include(UNMEASURED, run.unmeasured);
+            summand.include(INTENSITY, run.intensity);
+            summand.include(SQUARES, run.squares);
+        }
+        let class = run.class.map_or(0, |class| u64::from(class) + 1);
+        if is_new {
+            summand.include(CLASS, class);
+        }
+        let summand = summand.done();
+        match is_new {
+            true => {
+                let is_added = self.rows.insert_sum(number, summand);
+                if is_added {
+                    self.note(place);
+                }
+                is_added
+            }
+            // Votes for another class than the main one are elsewhere.
+            false => self.rows.add_if(number, summand, CLASS, class),
+        }
+    }
+
+    fn add_to_row(&mut self, place: usize, run: &HitRun, stamp_ns: Option<i64>, layers: &Layers) {
         let number = self.number_of(place);
         let mut row = number.map_or_else(Row::default, |number| self.rows.get(number));
-        self.add_to(&mut row, place, hit, layers);
+        let points_before = row.0[POINTS];
+        row.add(run);
+        match (run.class.map(|class| u64::from(class) + 1), row.0[CLASS]) {
+            (None, 0) => {}
+            (Some(class), 0) => (row.0[CLASS], row.0[OUTVOTED]) = (class, points_before),
+            (Some(class), main) if class == main => {}
+            _ => {
+                row.0[OUTVOTED] += run.points;
+                if let Some(class) = run.class {
+                    self.vote(place, class, run.points);
+                }
+            }
+        }
         if layers.time {
             let base_ns = self.note_base(stamp_ns);
             let before = row.time(base_ns).filter(|_| number.is_some());
@@ -57,54 +111,6 @@ impl LayeredBrick {
         match number {
             Some(number) => self.rows.set(number, &row),
             None => self.insert(place, &row),
-        }
-    }
-
-    #[inline]
-    fn add_to(&mut self, row: &mut Row, place: usize, hit: &LayerHit, layers: &Layers) {
-        let columns = &mut row.0;
-        let points_before = columns[POINTS];
-        columns[POINTS] += 1;
-        if layers.colour {
-            match hit.colour {
-                Some(colour) => (0..3).for_each(|k| columns[RED + k] += u64::from(colour[k])),
-                None => columns[UNCOLOURED] += 1,
-            }
-        }
-        if layers.intensity_max.is_some() {
-            match hit.intensity.map(u64::from) {
-                Some(intensity) => {
-                    columns[INTENSITY] += intensity;
-                    columns[SQUARES] += intensity * intensity;
-                }
-                None => columns[UNMEASURED] += 1,
-            }
-        }
-        if layers.shape {
-            let offset = hit.offset.map(i64::from);
-            let [x, y, z] = offset;
-            let mut add = |column: usize, number: i64| {
-                columns[column] = zigzag(unzigzag(columns[column]) + number);
-            };
-            (0..3).for_each(|k| add(OFFSETS + k, offset[k]));
-            [x * y, x * z, y * z]
-                .into_iter()
-                .enumerate()
-                .for_each(|(k, product)| add(PRODUCTS + 3 + k, product));
-            (0..3).for_each(|k| columns[PRODUCTS + k] += (offset[k] * offset[k]) as u64);
-        }
-        if layers.class {
-            match (hit.class.map(|class| u64::from(class) + 1), columns[CLASS]) {
-                (None, 0) => {}
-                (Some(class), 0) => (columns[CLASS], columns[OUTVOTED]) = (class, points_before),
-                (Some(class), main) if class == main => {}
-                (class, _) => {
-                    columns[OUTVOTED] += 1;
-                    if let Some(class) = class {
-                        self.vote(place, (class - 1) as u8, 1);
-                    }
-                }
-            }
         }
     }
 
@@ -129,13 +135,45 @@ impl LayeredBrick {
         }
     }
 
+    /// Visits the rows of the hit voxels in Morton order, each in its one form, with the base of its times and the votes
+    /// for other classes than the main one.
+    pub(super) fn for_each_row(&self, layers: &Layers, mut visit: impl FnMut(&Row, i64, &[ClassVotes])) {
+        let mut row = Row::default();
+        for (number, place) in places(self.mask).enumerate() {
+            self.rows.read(number, &mut row);
+            if self.others.is_empty() || row.0[OUTVOTED] == 0 {
+                visit(&row, self.base(), &[]);
+                continue;
+            }
+            let made = row.to_layers(self.base(), layers, self.others_of(place));
+            let row = Row::of(&made, self.base(), layers);
+            let mut others = made.classes;
+            others.retain(|votes| Some(votes.class) != row.main_class());
+            visit(&row, self.base(), &others);
+        }
+    }
+
     fn insert(&mut self, place: usize, row: &Row) {
-        self.rows.insert(rank(&self.mask, place), row);
+        self.rows.insert(self.rank(place), row);
+        self.note(place);
+    }
+
+    /// Notes that a voxel has a row.
+    fn note(&mut self, place: usize) {
         add_to_mask(&mut self.mask, place);
+        self.before[place / 64 + 1..].iter_mut().for_each(|before| *before += 1);
     }
 
     fn number_of(&self, place: usize) -> Option<usize> {
-        is_in_mask(&self.mask, place).then(|| rank(&self.mask, place))
+        is_in_mask(&self.mask, place).then(|| self.rank(place))
+    }
+
+    /// Number of hit voxels before a position.
+    #[inline]
+    fn rank(&self, place: usize) -> usize {
+        let (word, bit) = (place / 64, place % 64);
+        let in_word = (self.mask[word] & ((1 << bit) - 1)).count_ones();
+        usize::from(self.before[word]) + in_word as usize
     }
 
     fn base(&self) -> i64 {
@@ -163,12 +201,4 @@ impl LayeredBrick {
         let of_voxel = self.others[from..].iter().take_while(move |other| usize::from(other.place) == place);
         of_voxel.map(|other| ClassVotes { class: other.class, votes: other.votes })
     }
-}
-
-/// Number of voxels in a mask before a position.
-#[inline]
-fn rank(mask: &BrickMask, place: usize) -> usize {
-    let (word, bit) = (place / 64, place % 64);
-    let before: u32 = mask[..word].iter().map(|word| word.count_ones()).sum();
-    (before + (mask[word] & ((1 << bit) - 1)).count_ones()) as usize
 }

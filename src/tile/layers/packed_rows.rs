@@ -1,26 +1,110 @@
-use super::row::{COLUMNS, Row};
+use super::row::{COLUMNS, FIRST_BITS, RED, Row};
 
 /// Rows of integers, each column with as many bits as its largest value needs. A row begins at a byte.
 #[derive(Clone, Debug, Default)]
 pub(super) struct PackedRows {
     /// Bits of each column.
     bits: [u8; COLUMNS],
+    /// First bit of each column in a row; only valid if `ends` is not 0.
+    starts: [u8; COLUMNS],
     /// Number of columns up to the last one with bits.
     used: usize,
     /// Bytes of a row.
     stride: usize,
-    /// The rows, and eight bytes after the last one, so that eight bytes can be read at each byte of a row.
+    /// The bit after each column. 0 if a row has more bits than [`PackedRows::add`] supports.
+    ends: u128,
+    /// The rows, and [`PADDING`] bytes after the last one.
     bytes: Vec<u8>,
 }
 
-const PADDING: usize = 8;
+/// So many bytes can be read at the first byte of each row, and eight at each other one.
+const PADDING: usize = 16;
 
 /// Fields of more bits are read and written in two parts, because they begin within a byte.
 const MAX_BITS_AT_ONCE: u8 = 56;
 
+/// Integers to add to a row, in its packed form.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Summand {
+    bits: u128,
+    fits: bool,
+}
+
+/// Packs integers to add to a row.
+pub(super) struct SummandPacker<'a> {
+    rows: &'a PackedRows,
+    bits: u128,
+    /// Bits of the integers that do not fit in their columns.
+    excess: u64,
+}
+
+impl SummandPacker<'_> {
+    /// Includes the integer of a column, once per column.
+    #[inline]
+    pub(super) fn include(&mut self, column: usize, value: u64) {
+        self.excess |= value >> (self.rows.bits[column] & 63);
+        self.bits |= u128::from(value) << (self.rows.starts[column] & 127);
+    }
+
+    #[inline]
+    pub(super) fn done(self) -> Summand {
+        Summand { bits: self.bits, fits: self.excess == 0 }
+    }
+}
+
 impl PackedRows {
     pub(super) fn len(&self) -> usize {
         self.bytes.len().saturating_sub(PADDING).checked_div(self.stride).unwrap_or(0)
+    }
+
+    /// Starts the integers that are to be added to a row; `None` if rows have too many bits for that.
+    #[inline]
+    pub(super) fn summand(&self) -> Option<SummandPacker<'_>> {
+        (self.ends != 0).then_some(SummandPacker { rows: self, bits: 0, excess: 0 })
+    }
+
+    /// Adds integers to the columns of a row if the integer in `column` is `value`. Returns `false`, with the row
+    /// unchanged, if it is another one, or if one of the sums has too many bits.
+    #[inline]
+    pub(super) fn add_if(&mut self, number: usize, summand: Summand, column: usize, value: u64) -> bool {
+        let at = number * self.stride;
+        let Some(bytes) = self.bytes.get(at..).and_then(<[u8]>::first_chunk) else { return false };
+        // The next rows follow the last column.
+        let before = u128::from_le_bytes(*bytes);
+        let sum = before.wrapping_add(summand.bits);
+        // A bit of the sum differs from the sum without carries where a carry arrived.
+        let carries = before ^ summand.bits ^ sum;
+        let fits = summand.fits && carries & self.ends == 0 && self.value_in(before, column) == value;
+        if fits && let Some(bytes) = self.bytes[at..].first_chunk_mut() {
+            *bytes = sum.to_le_bytes();
+        }
+        fits
+    }
+
+    /// The integer of a column in a packed row.
+    #[inline]
+    fn value_in(&self, row: u128, column: usize) -> u64 {
+        (row >> (self.starts[column] & 127)) as u64 & ((1 << (self.bits[column] & 63)) - 1)
+    }
+
+    /// Inserts a row with these integers before the row with this number; returns `false`, with the rows unchanged, if
+    /// one of them has too many bits.
+    #[inline]
+    pub(super) fn insert_sum(&mut self, number: usize, summand: Summand) -> bool {
+        if summand.fits {
+            self.make_gap(number);
+            let of_row = u128::MAX >> (128 - 8 * self.stride);
+            if let Some(bytes) = self.packed_row(number) {
+                *bytes = (u128::from_le_bytes(*bytes) & !of_row | summand.bits).to_le_bytes();
+            }
+        }
+        summand.fits
+    }
+
+    /// The bytes of a row and those after it.
+    #[inline]
+    fn packed_row(&mut self, number: usize) -> Option<&mut [u8; size_of::<u128>()]> {
+        self.bytes.get_mut(number * self.stride..)?.first_chunk_mut()
     }
 
     pub(super) fn heap_bytes(&self) -> usize {
@@ -30,14 +114,30 @@ impl PackedRows {
     #[inline]
     pub(super) fn get(&self, number: usize) -> Row {
         let mut row = Row::default();
+        self.read(number, &mut row);
+        row
+    }
+
+    /// Reads a row. The columns after the last used one remain as they are.
+    #[inline]
+    pub(super) fn read(&self, number: usize, row: &mut Row) {
+        if self.ends != 0
+            && let Some(bytes) = self.bytes.get(number * self.stride..).and_then(<[u8]>::first_chunk)
+        {
+            let packed = u128::from_le_bytes(*bytes);
+            for (column, integer) in row.0.iter_mut().enumerate().take(self.used) {
+                *integer = self.value_in(packed, column);
+            }
+            return;
+        }
         let mut at = number * self.stride * 8;
         for (column, &bits) in row.0.iter_mut().zip(&self.bits[..self.used]) {
+            *column = 0;
             if bits > 0 {
                 *column = self.field(at, bits);
                 at += usize::from(bits);
             }
         }
-        row
     }
 
     /// Replaces a row.
@@ -50,15 +150,22 @@ impl PackedRows {
     /// Inserts a row before the row with this number.
     pub(super) fn insert(&mut self, number: usize, row: &Row) {
         self.make_room_for(row);
+        self.make_gap(number);
+        let at = number * self.stride;
+        self.bytes[at..at + self.stride].fill(0);
+        self.write(number, row);
+    }
+
+    /// Makes room for a row before the row with this number. The room has no defined content.
+    fn make_gap(&mut self, number: usize) {
         let at = number * self.stride;
         let len = self.bytes.len();
         if len + self.stride > self.bytes.capacity() {
             // Less slack than the default growth of a vector.
-            self.bytes.reserve_exact(self.stride.max(len / 4));
+            self.bytes.reserve_exact((4 * self.stride).max(len / 4));
         }
         self.bytes.resize(len + self.stride, 0);
         self.bytes.copy_within(at..len, at + self.stride);
-        self.write(number, row);
     }
 
     #[inline]
@@ -83,19 +190,55 @@ impl PackedRows {
     #[cold]
     fn widen(&mut self, row: &Row) {
         let mut bits = self.bits;
-        for (bits, &value) in bits.iter_mut().zip(&row.0) {
+        for ((bits, first), &value) in bits.iter_mut().zip(FIRST_BITS).zip(&row.0) {
             let needed = bits_of(value);
             if needed > *bits {
                 // One more than needed: sums grow.
-                *bits = if *bits == 0 { needed } else { (needed + 1).min(64) };
+                *bits = if *bits == 0 { needed.max(first) } else { (needed + 1).min(64) };
             }
         }
-        let used = bits.iter().rposition(|bits| *bits > 0).map_or(0, |last| last + 1);
-        let stride = bits.iter().map(|bits| usize::from(*bits)).sum::<usize>().div_ceil(8).max(1);
+        // Colours grow together.
+        let most = bits[RED..RED + 3].iter().copied().max().unwrap_or(0);
+        bits[RED..RED + 3].fill(most);
+        let mut wider = Self::with_bits(bits);
         let count = self.len();
-        let mut wider = Self { bits, used, stride, bytes: vec![0; count * stride + PADDING] };
-        (0..count).for_each(|number| wider.write(number, &self.get(number)));
+        wider.bytes = vec![0; count * wider.stride + PADDING];
+        for number in 0..count {
+            match self.ends != 0 && wider.ends != 0 {
+                true => self.copy_packed(number, &mut wider),
+                false => wider.write(number, &self.get(number)),
+            }
+        }
         *self = wider;
+    }
+
+    fn with_bits(bits: [u8; COLUMNS]) -> Self {
+        let used = bits.iter().rposition(|bits| *bits > 0).map_or(0, |last| last + 1);
+        let (mut starts, mut total, mut ends) = ([0; COLUMNS], 0_usize, 0);
+        for (start, &bits) in starts.iter_mut().zip(&bits[..used]) {
+            *start = total.min(127) as u8;
+            total += usize::from(bits);
+            ends |= 1_u128.checked_shl(total as u32).unwrap_or(0);
+        }
+        if total > 127 || bits.contains(&64) {
+            ends = 0;
+        }
+        Self { bits, starts, used, stride: total.div_ceil(8).max(1), ends, bytes: Vec::new() }
+    }
+
+    /// Copies a row in its packed form to the same row of `wider`.
+    fn copy_packed(&mut self, number: usize, wider: &mut Self) {
+        let Some(row) = self.packed_row(number).map(|bytes| u128::from_le_bytes(*bytes)) else { return };
+        let mut wide = 0;
+        for column in 0..self.used {
+            if self.bits[column] > 0 {
+                wide |= u128::from(self.value_in(row, column)) << (wider.starts[column] & 127);
+            }
+        }
+        // Zeros after the row: rows are copied in ascending order.
+        if let Some(bytes) = wider.packed_row(number) {
+            *bytes = wide.to_le_bytes();
+        }
     }
 
     #[inline]
@@ -157,7 +300,102 @@ mod tests {
         })
     }
 
+    #[derive(Clone, Debug)]
+    enum Step {
+        Set(usize, Row),
+        Insert(usize, Row),
+        /// Adds to an existing row.
+        Add(usize, Row),
+        InsertSum(usize, Row),
+    }
+
+    fn any_step() -> impl Strategy<Value = Step> {
+        let summand =
+            prop::collection::vec(prop_oneof![2 => Just(0), 2 => 0..6_u64, 1 => any::<u64>()], COLUMNS);
+        let summand = summand.prop_map(|values| {
+            let mut row = Row::default();
+            row.0[..6].copy_from_slice(&values[..6]);
+            row
+        });
+        prop_oneof![
+            1 => (any::<usize>(), any_row()).prop_map(|(at, row)| Step::Set(at, row)),
+            1 => (any::<usize>(), any_row()).prop_map(|(at, row)| Step::Insert(at, row)),
+            4 => (any::<usize>(), summand.clone()).prop_map(|(at, row)| Step::Add(at, row)),
+            2 => (any::<usize>(), summand).prop_map(|(at, row)| Step::InsertSum(at, row)),
+        ]
+    }
+
+    fn packed(rows: &PackedRows, row: &Row) -> Option<Summand> {
+        let mut packer = rows.summand()?;
+        for (column, value) in row.0.iter().enumerate().filter(|(_, value)| **value > 0) {
+            packer.include(column, *value);
+        }
+        Some(packer.done())
+    }
+
+    #[test]
+    fn sums_are_packed_until_a_column_has_too_few_bits() {
+        let mut rows = PackedRows::default();
+        assert!(rows.summand().is_none());
+        let (mut one, mut last) = (Row::default(), Row::default());
+        (one.0[0], one.0[COLUMNS - 1]) = (1, 1);
+        last.0[COLUMNS - 1] = 1;
+        rows.insert(0, &one);
+        let two = packed(&rows, &one).unwrap();
+        assert!(rows.insert_sum(1, two));
+        // The last column has one bit, and the next row follows it.
+        assert!(!rows.add_if(0, packed(&rows, &last).unwrap(), 0, 1));
+        let mut more = Row::default();
+        more.0[0] = 6;
+        assert!(rows.add_if(0, packed(&rows, &more).unwrap(), COLUMNS - 1, 1));
+        assert!(!rows.add_if(1, packed(&rows, &more).unwrap(), COLUMNS - 1, 0));
+        more.0[0] = 1;
+        assert!(!rows.add_if(0, packed(&rows, &more).unwrap(), COLUMNS - 1, 1));
+        more.0[0] = 8;
+        assert!(!rows.insert_sum(0, packed(&rows, &more).unwrap()));
+        assert_eq!([rows.get(0).0[0], rows.get(1).0[0]], [7, 1]);
+    }
+
     proptest! {
+        #[test]
+        fn sums_equal_those_of_a_list(steps in prop::collection::vec(any_step(), 1..60)) {
+            let (mut rows, mut list) = (PackedRows::default(), Vec::<Row>::new());
+            for step in steps {
+                let at = |at: usize| at % list.len().max(1);
+                match step {
+                    Step::Insert(number, row) => {
+                        let number = number % (list.len() + 1);
+                        list.insert(number, row);
+                        rows.insert(number, &row);
+                    }
+                    Step::InsertSum(number, row) => {
+                        let number = number % (list.len() + 1);
+                        if packed(&rows, &row).is_some_and(|summand| rows.insert_sum(number, summand)) {
+                            list.insert(number, row);
+                        }
+                    }
+                    _ if list.is_empty() => {}
+                    Step::Set(number, row) => {
+                        let number = at(number);
+                        list[number] = row;
+                        rows.set(number, &row);
+                    }
+                    Step::Add(number, row) => {
+                        let number = at(number);
+                        let Some(summand) = packed(&rows, &row) else { continue };
+                        let value = list[number].0[8];
+                        prop_assert!(!rows.add_if(number, summand, 8, value.wrapping_add(1)));
+                        if rows.add_if(number, summand, 8, value) {
+                            (0..COLUMNS).for_each(|k| list[number].0[k] += row.0[k]);
+                        }
+                    }
+                }
+                for (number, row) in list.iter().enumerate() {
+                    prop_assert_eq!(rows.get(number), *row);
+                }
+            }
+        }
+
         #[test]
         fn packed_rows_equal_a_list(steps in prop::collection::vec((any::<bool>(), any::<usize>(), any_row()), 1..60)) {
             let (mut packed, mut rows) = (PackedRows::default(), Vec::<Row>::new());

@@ -1,3 +1,4 @@
+use super::hit_run::HitRun;
 use super::voxel_layers::{ClassVotes, ColourSums, IntensitySums, ShapeSums, TimeSpan, VoxelLayers};
 use crate::config::Layers;
 use crate::scan::{unzigzag, zigzag};
@@ -36,15 +37,54 @@ pub(super) const OFFSETS: usize = 13;
 /// Three sums of squares, then three sums of products as zigzag.
 pub(super) const PRODUCTS: usize = 16;
 
+/// Bits with which a column begins: sums of a few points fit. Columns that are not listed begin with what they need.
+pub(super) const FIRST_BITS: [u8; COLUMNS] = {
+    let mut bits = [0; COLUMNS];
+    bits[POINTS] = 3;
+    (bits[RED], bits[RED + 1], bits[RED + 2]) = (10, 10, 10);
+    (bits[CLASS], bits[OUTVOTED]) = (5, 2);
+    bits
+};
+
+/// The columns that layers may use, in ascending order.
+pub(crate) fn columns_of(layers: &Layers) -> Vec<usize> {
+    let is_used = |column: usize| match column {
+        POINTS => true,
+        UNCOLOURED..UNMEASURED => layers.colour,
+        UNMEASURED..CLASS => layers.intensity_max.is_some(),
+        CLASS..UNTIMED => layers.class,
+        UNTIMED..OFFSETS => layers.time,
+        _ => layers.shape,
+    };
+    (0..COLUMNS).filter(|column| is_used(*column)).collect()
+}
+
 impl Row {
+    /// Adds the sums over points, except for their class.
+    pub(super) fn add(&mut self, run: &HitRun) {
+        let columns = &mut self.0;
+        columns[POINTS] += run.points;
+        columns[UNCOLOURED] += run.uncoloured;
+        (0..3).for_each(|k| columns[RED + k] += run.colour[k]);
+        columns[UNMEASURED] += run.unmeasured;
+        columns[INTENSITY] += run.intensity;
+        columns[SQUARES] += run.squares;
+        let mut add = |column: usize, sum: i64| {
+            columns[column] = zigzag(unzigzag(columns[column]) + sum);
+        };
+        (0..3).for_each(|k| add(OFFSETS + k, run.offsets[k]));
+        (3..6).for_each(|k| add(PRODUCTS + k, run.products[k]));
+        (0..3).for_each(|k| columns[PRODUCTS + k] += run.products[k] as u64);
+    }
+
     /// The time span; `base_ns` is that of the brick.
-    pub(super) fn time(&self, base_ns: i64) -> Option<TimeSpan> {
+    pub(crate) fn time(&self, base_ns: i64) -> Option<TimeSpan> {
         let first_ns = base_ns.wrapping_add(unzigzag(self.0[FIRST]));
         let last_ns = first_ns.wrapping_add(self.0[SPAN] as i64);
         (self.0[UNTIMED] == 0).then_some(TimeSpan { first_ns, last_ns })
     }
 
-    pub(super) fn set_time(&mut self, base_ns: i64, time: Option<TimeSpan>) {
+    pub(crate) fn set_time(&mut self, base_ns: i64, time: Option<TimeSpan>) {
         self.0[UNTIMED] = u64::from(time.is_none());
         let TimeSpan { first_ns, last_ns } = time.unwrap_or(TimeSpan { first_ns: base_ns, last_ns: base_ns });
         self.0[FIRST] = zigzag(first_ns.wrapping_sub(base_ns));
@@ -90,12 +130,12 @@ impl Row {
 
     /// Converts the row; `others` are the votes for other classes than the main one.
     pub(super) fn to_layers(
-        self,
+        &self,
         base_ns: i64,
         layers: &Layers,
         others: impl Iterator<Item = ClassVotes>,
     ) -> VoxelLayers {
-        let Self(columns) = self;
+        let Self(columns) = *self;
         let points = columns[POINTS];
         let mut classes: Vec<ClassVotes> = others.collect();
         if let Some(class) = columns[CLASS].checked_sub(1) {

@@ -16,7 +16,7 @@ use super::numbers::{put_number, take_number};
 use crate::config::Layers;
 use crate::error::{DecodeError, FormatError};
 use crate::space::{BRICK_EDGE, BrickCode, BrickMask, MortonCode, VoxelBox, places};
-use crate::tile::layers::{COLUMNS, ClassVotes, LayerTable, Row};
+use crate::tile::layers::{COLUMNS, ClassVotes, LayerTable, Row, columns_of};
 use std::io::{self, Read};
 
 /// "VXTL", little-endian.
@@ -74,15 +74,25 @@ impl Encoded {
         let layers = table.layers();
         // Times are relative to that of the voxel before.
         let (mut time_ns, mut number, mut voted) = (0, 0_u64, 0);
-        table.for_each(|_, made| {
-            let row = Row::of(&made, time_ns, &layers);
-            for (column, out) in row.0.iter().zip(&mut self.integers) {
-                put_number(*column, out);
+        let used = columns_of(&layers);
+        table.for_each_row(|row, base_ns, others| {
+            let mut row = *row;
+            if layers.time {
+                let time = row.time(base_ns);
+                row.set_time(time_ns, time);
+                time_ns = time.map_or(time_ns, |time| time.first_ns);
             }
-            time_ns = made.time.map_or(time_ns, |time| time.first_ns);
-            let main = row.main_class();
-            for &ClassVotes { class, votes } in made.classes.iter().filter(|votes| Some(votes.class) != main)
-            {
+            for &column in &used {
+                let (integer, out) = (row.0[column], &mut self.integers[column]);
+                // A column of zeros, such as those of absent layers, takes no bytes.
+                if integer > 0 && out.is_empty() {
+                    out.resize(number as usize, 0);
+                }
+                if integer > 0 || !out.is_empty() {
+                    put_number(integer, out);
+                }
+            }
+            for &ClassVotes { class, votes } in others {
                 put_number(number - voted, &mut self.others);
                 self.others.push(class);
                 put_number(votes, &mut self.others);
@@ -90,10 +100,6 @@ impl Encoded {
             }
             number += 1;
         });
-        // A column of zeros, such as those of absent layers, takes no bytes.
-        for column in self.integers.iter_mut().filter(|column| column.iter().all(|byte| *byte == 0)) {
-            column.clear();
-        }
     }
 }
 
