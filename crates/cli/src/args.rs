@@ -23,7 +23,7 @@ pub use build::{
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use clap_complete::Shell;
 pub use clean::CleanArgs;
-pub use compare::{CompareArgs, CoverageArgs};
+pub use compare::{CompareArgs, CoverageArgs, VolumeArgs};
 pub use distance::DistanceArgs;
 pub use edit::{ClearArgs, CropArgs, DecayArgs, MergeArgs};
 pub use export::{ExportArgs, WhatName};
@@ -113,6 +113,8 @@ pub enum Command {
     Compare(CompareArgs),
     /// List the frontiers of a map: free voxels next to unknown ones
     Coverage(CoverageArgs),
+    /// Compute the volume that was filled and cut between two maps, or over a plane
+    Volume(VolumeArgs),
     /// Restore a map to a snapshot, in place
     Revert(RevertArgs),
     /// Merge several maps into a new one, without their snapshots and kept scans
@@ -191,6 +193,7 @@ impl Command {
             Self::Diff(args) => args.json,
             Self::Compare(args) => args.json,
             Self::Coverage(args) => args.json,
+            Self::Volume(args) => args.json,
             Self::Revert(args) => args.json,
             Self::Merge(args) => args.json,
             Self::Crop(args) => args.json,

@@ -60,6 +60,7 @@ mod threads;
 mod verify;
 #[cfg(feature = "view")]
 mod view;
+mod volume;
 mod written;
 
 pub use run::{main, run};

@@ -8,6 +8,7 @@ use super::{
     build, clean, clear, compare, completions, convert, coverage, crop, decay, demo, diff, digest, distance,
     export, import, info, local, logging, man, merge, option_names, picture, query, quiet, raycast, remap,
     remove_points, remove_scans, repair, report, revert, scans, share, snapshot, snapshots, threads, verify,
+    volume,
 };
 #[cfg(feature = "bucket")]
 use super::{pull, push};
@@ -66,6 +67,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
         Command::Diff(args) => diff::run(&args),
         Command::Compare(args) => compare::run(&args),
         Command::Coverage(args) => coverage::run(&args),
+        Command::Volume(args) => volume::run(&args),
         Command::Revert(args) => revert::run(&args),
         Command::Merge(args) => merge::run(&args),
         Command::Crop(args) => crop::run(&args),
@@ -153,6 +155,7 @@ fn is_parallel(command: &Command) -> bool {
         | Command::Clean(_)
         | Command::Compare(_)
         | Command::Coverage(_)
+        | Command::Volume(_)
         | Command::Local(_)
         | Command::Demo(_)
         | Command::Distance(_)

@@ -22,7 +22,7 @@ pub(crate) struct Run {
 }
 
 /// Position within a brick of each voxel in Morton order.
-static IN_BRICK: [[u8; 3]; BRICK_VOXELS] = positions();
+pub(crate) static IN_BRICK: [[u8; 3]; BRICK_VOXELS] = positions();
 
 const fn positions() -> [[u8; 3]; BRICK_VOXELS] {
     let mut all = [[0; 3]; BRICK_VOXELS];

@@ -40,23 +40,27 @@ impl Cube {
 
     /// The tiles of a map that overlap the cube, in order.
     pub(crate) fn tiles(self, map: &impl MapView) -> Vec<TileIndex> {
-        /// Looking up this many tiles is cheaper than listing all tiles of a large map.
-        const MAX_LOOKED_UP: u64 = 4096;
-        let voxels = self.voxels();
-        if voxels.is_empty() {
-            return Vec::new();
-        }
-        let grid = &map.config().grid;
-        let last = voxels.end.map(|k| k - 1);
-        let wanted = TileBox::new(grid.tile_of_voxel(voxels.min), grid.tile_of_voxel(last));
-        let Some(tiles) = map.tile_bounds().and_then(|bounds| bounds.intersection(wanted)) else {
-            return Vec::new();
-        };
-        if tiles.count() <= MAX_LOOKED_UP {
-            return tiles.tiles().filter(|&tile| map.has_tile(tile)).collect();
-        }
-        map.tile_indices().into_iter().filter(|&tile| tiles.contains(tile)).collect()
+        tiles_in(map, &self.voxels())
     }
+}
+
+/// The tiles of a map that overlap a box of voxels, in order.
+pub(crate) fn tiles_in(map: &impl MapView, voxels: &VoxelBox) -> Vec<TileIndex> {
+    /// Looking up this many tiles is cheaper than listing all tiles of a large map.
+    const MAX_LOOKED_UP: u64 = 4096;
+    if voxels.is_empty() {
+        return Vec::new();
+    }
+    let grid = &map.config().grid;
+    let last = voxels.end.map(|k| k - 1);
+    let wanted = TileBox::new(grid.tile_of_voxel(voxels.min), grid.tile_of_voxel(last));
+    let Some(tiles) = map.tile_bounds().and_then(|bounds| bounds.intersection(wanted)) else {
+        return Vec::new();
+    };
+    if tiles.count() <= MAX_LOOKED_UP {
+        return tiles.tiles().filter(|&tile| map.has_tile(tile)).collect();
+    }
+    map.tile_indices().into_iter().filter(|&tile| tiles.contains(tile)).collect()
 }
 
 /// The blocks that overlap tiles, by x, then y, then z.

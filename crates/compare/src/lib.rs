@@ -12,6 +12,7 @@
 //! compare -> Comparison                           counts, and the list of changes
 //! for_each_voxel                                  the voxels with their classes, in a second pass
 //! frontiers                                       free voxels next to unknown ones, of one map
+//! tops -> volumes                                 highest voxels of columns, and what is between two surfaces
 //! ```
 //!
 //! All of it takes constant memory per core, in addition to the list of changes. Blocks do not depend on tiles, so the
@@ -31,7 +32,10 @@ mod options;
 mod sets;
 mod sweep;
 mod tile_masks;
+mod tops;
 mod visit;
+mod volume_options;
+mod volumes;
 mod voxel_class;
 
 pub use change::{Change, ChangeKind, Clusters, Comparison, EpochCounts};
@@ -39,4 +43,6 @@ pub use compare::compare;
 pub use frontiers::{Coverage, Frontier, FrontierOptions, frontiers};
 pub use options::{CompareOptions, MAX_TOLERANCE_VOXELS};
 pub use visit::{ComparedVoxel, for_each_voxel};
+pub use volume_options::VolumeOptions;
+pub use volumes::{VolumeSums, Volumes, volumes, volumes_over_plane};
 pub use voxel_class::VoxelClass;

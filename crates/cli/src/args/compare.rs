@@ -59,3 +59,30 @@ pub struct CoverageArgs {
     #[arg(long)]
     pub json: bool,
 }
+
+#[derive(Debug, Args)]
+#[command(allow_negative_numbers = true)]
+pub struct VolumeArgs {
+    /// Earlier map: a folder, FOLDER@SNAPSHOT, or an OctoMap file (.bt .ot). Its surface is the highest occupied voxel
+    /// of each column
+    pub map: PathBuf,
+    /// Later map of the same resolution: fill is where its surface is higher, cut where it is lower
+    pub after: Option<PathBuf>,
+    /// Instead of a later map: fill is what the map has above this height in metres, cut what is missing below it
+    #[arg(long, value_name = "Z", conflicts_with = "after")]
+    pub plane: Option<f64>,
+    /// Difference of heights from which on a column counts, in metres, rounded to voxels
+    #[arg(long, value_name = "M", default_value_t = 0.0, conflicts_with = "plane")]
+    pub least: f64,
+    #[arg(long, value_names = ["X0", "Y0", "Z0", "X1", "Y1", "Z1"], num_args = 6, help = help::VOXELS_IN_BOX)]
+    pub region: Option<Vec<f64>>,
+    /// Only columns with their center in the polygons of a GeoJSON file, in the map's coordinates
+    #[arg(long, value_name = "FILE")]
+    pub polygon: Option<PathBuf>,
+    /// Memory for tiles, such as 256MiB or 1GB; at least what one block of columns needs
+    #[arg(long, value_name = "SIZE", default_value = "256MiB")]
+    pub memory: ByteSize,
+    /// Print the result as JSON
+    #[arg(long)]
+    pub json: bool,
+}

@@ -165,3 +165,47 @@ fn frontiers_are_listed() {
     let summary = output(&["coverage", text(&map)]);
     assert!(summary.contains("observed  25 occupied voxels") && summary.contains("1 frontier,"), "{summary}");
 }
+
+/// Makes a map of a floor of 2 x 2 m seen from above, with a heap of one square metre.
+fn site(folder: &Path, name: &str, heap_m: f64) -> PathBuf {
+    let map = folder.join(name);
+    let config = MapConfig::new(0.1, 10.0).unwrap();
+    let mut mapper = MapOptions::new().config(config).create_new(true).open(&map).unwrap();
+    for (x, y) in (0..20).flat_map(|x| (0..20).map(move |y| (x, y))) {
+        let z = if x < 10 && y < 10 { heap_m } else { 0.0 };
+        let [x, y, z] = [f64::from(x) * 0.1, f64::from(y) * 0.1, z].map(|k| k + 0.05);
+        mapper
+            .insert_scan(&Scan { origin: [x, y, 4.0], points: vec![[x, y, z]], ..Scan::default() })
+            .unwrap();
+    }
+    mapper.flush().unwrap();
+    map
+}
+
+#[test]
+fn volumes_between_maps_and_over_planes_are_printed() {
+    let folder = TempDir::new().unwrap();
+    let (before, after) = (site(folder.path(), "before", 0.0), site(folder.path(), "after", 1.5));
+    let near = |value: &serde_json::Value, wanted: f64| (value.as_f64().unwrap() - wanted).abs() < 1e-9;
+    let found = json(&["volume", text(&before), text(&after), "--json"]);
+    let measured = &found["measured"];
+    assert!(near(&measured["fill_m3"], 1.5) && near(&measured["cut_m3"], 0.0), "{found}");
+    assert!(near(&measured["area_m2"], 4.0) && near(&found["measured_share"], 1.0), "{found}");
+    assert_eq!((&found["after"], &found["plane_m"]), (&text(&after).into(), &serde_json::Value::Null));
+    let back = json(&["volume", text(&after), text(&before), "--json"]);
+    assert!(near(&back["measured"]["cut_m3"], 1.5) && near(&back["measured"]["net_m3"], -1.5), "{back}");
+    let plane = json(&["volume", text(&after), "--plane", "-0.95", "--json"]);
+    assert!(near(&plane["measured"]["fill_m3"], 4.0 + 1.5), "{plane}");
+    let polygon = folder.path().join("half.geojson");
+    fs::write(&polygon, r#"{"type":"Polygon","coordinates":[[[0,0],[0.5,0],[0.5,1],[0,1],[0,0]]]}"#).unwrap();
+    let part = json(&["volume", text(&before), text(&after), "--polygon", text(&polygon), "--json"]);
+    assert!(near(&part["measured"]["fill_m3"], 0.75) && near(&part["area_m2"], 0.5), "{part}");
+    let printed = output(&["volume", text(&before), text(&after), "--region", "0", "0", "-1", "4", "1", "3"]);
+    for line in ["measured             2.00        1.500        0.000       +1.500", "4.00, 50.0 % measured"]
+    {
+        assert!(printed.contains(line), "{printed}");
+    }
+    assert!(failure(&["volume", text(&before)]).1.contains("--plane"));
+    assert!(failure(&["volume", text(&before), "--plane", "nan"]).1.contains("finite height"));
+    assert!(failure(&["volume", text(&before), text(&after), "--least", "-1"]).1.contains("least"));
+}

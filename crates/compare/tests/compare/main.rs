@@ -6,3 +6,4 @@ mod frontiers;
 mod naive;
 mod random_maps;
 mod refused;
+mod volumes;
