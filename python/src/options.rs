@@ -53,15 +53,8 @@ pub fn read_options(py: Python<'_>, keywords: &mut Keywords<'_>) -> PyResult<Rea
     selection.count = keywords.count("count")?;
     selection.every = keywords.count("every")?.unwrap_or(selection.every);
     selection.ignored = region(py, keywords, "ignore_box")?;
-    let classes = |numbers: Option<Vec<f64>>, name| {
-        numbers
-            .unwrap_or_default()
-            .into_iter()
-            .map(|class| class_of(py, name, class))
-            .collect::<PyResult<_>>()
-    };
-    options.classes.only_class = classes(keywords.numbers("only_class")?, "only_class")?;
-    options.classes.skip_class = classes(keywords.numbers("skip_class")?, "skip_class")?;
+    options.classes.only_class = classes(py, keywords, "only_class")?;
+    options.classes.skip_class = classes(py, keywords, "skip_class")?;
     options.returns = keywords.one_of("returns", &RETURNS)?.unwrap_or_default();
     let recording = &mut options.recording;
     recording.topic = keywords.text("topic")?;
@@ -133,6 +126,12 @@ pub fn build_options(
     Ok(options)
 }
 
+/// Takes a list of classes; empty without one.
+fn classes(py: Python<'_>, keywords: &mut Keywords<'_>, name: &'static str) -> PyResult<Vec<u8>> {
+    let numbers = keywords.numbers(name)?.unwrap_or_default();
+    numbers.into_iter().map(|class| class_of(py, name, class)).collect()
+}
+
 /// Takes the options of an export (`voxtile.files.ExportOptions`) from the keywords.
 pub fn export_options(
     py: Python<'_>,
@@ -151,6 +150,7 @@ pub fn export_options(
     options.which = min_probability.or(what);
     options.with_layers = !keywords.flag("no_layers")?;
     options.mean_points = keywords.flag("mean_points")?;
+    options.only_classes = classes(py, &mut keywords, "only_class")?;
     options.z_min_m = keywords.number("z_min")?;
     options.z_max_m = keywords.number("z_max")?;
     options.cell_m = keywords.number("cell")?;

@@ -116,7 +116,7 @@ pub fn decay(map: impl Into<MapPath>, decay: &Decay, mut progress: impl FnMut(u6
             progress(done, tiles.len() as u64);
             let before = editor.table(tile)?;
             let mut has_changed = false;
-            let after = changed(&before, |evidence| {
+            let after = changed(&before, |_, evidence| {
                 let after = decay.faded(evidence, factor);
                 has_changed |=
                     after.is_none_or(|after| after.log_odds.to_bits() != evidence.log_odds.to_bits());

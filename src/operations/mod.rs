@@ -8,7 +8,7 @@
 //! make_shard, move_shard   a map -> a shard of a future map, by copying or moving
 //! join    shards -> MapWriter, by hard links
 //! replace_tiles   readers of parts -> MapEditor: replaces tiles of a map -> one commit
-//! clear, decay   MapEditor: tiles read, changed, written as next versions -> one commit
+//! clear, decay, forget_old   MapEditor: tiles read, changed, written as next versions -> one commit
 //! a flush  -> snapshot -> snapshots/NAME; its tables are kept
 //! snapshot -> revert   -> one commit
 //! kept scans with new poses, or removed -> remapping: affected tiles replayed -> one commit
@@ -22,6 +22,7 @@ mod convert;
 mod crop;
 mod decay;
 mod diff;
+mod forget;
 mod import;
 mod join;
 mod kept_bytes;
@@ -44,6 +45,7 @@ pub use convert::convert;
 pub use crop::{crop, crop_area, crop_shard};
 pub use decay::{Decay, Decayed, decay};
 pub use diff::{Diff, TileChange, TileDiff, VoxelDiff, diff};
+pub use forget::{Forgotten, MaxAge, forget_old};
 pub use import::import;
 pub use join::join;
 pub use kept_bytes::{KeptBytes, kept_bytes};

@@ -2,7 +2,7 @@
 
 use super::part::VoxelPart;
 use crate::sensor::Evidence;
-use crate::space::{BRICK_EDGE, VoxelBox};
+use crate::space::{BRICK_EDGE, MortonCode, VoxelBox};
 use crate::tile::Table;
 
 /// Returns the table of the voxels in a part of space. `tile` is the box of the tile's voxels.
@@ -23,13 +23,18 @@ pub(super) fn voxels_of_part(table: &Table, tile: &VoxelBox, part: &VoxelPart) -
     kept
 }
 
-/// Applies `change` to each voxel's evidence. Voxels without a result are removed.
-pub(super) fn changed(table: &Table, mut change: impl FnMut(Evidence) -> Option<Evidence>) -> Table {
+/// Applies `change` to each voxel and its evidence. Voxels without a result are removed.
+pub(super) fn changed(
+    table: &Table,
+    mut change: impl FnMut(MortonCode, Evidence) -> Option<Evidence>,
+) -> Table {
     let mut after = Table::default();
     let mut run = Vec::new();
     for brick in table.bricks() {
         run.clear();
-        table.for_each_in(brick, |place, evidence| run.extend(change(evidence).map(|after| (place, after))));
+        table.for_each_in(brick, |place, evidence| {
+            run.extend(change(brick.voxel(place), evidence).map(|after| (place, after)));
+        });
         after.insert(brick, &run);
     }
     keep_layers(&mut after, table);

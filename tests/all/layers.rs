@@ -2,6 +2,7 @@
 
 use crate::harness::all_layers;
 use rayon::ThreadPoolBuilder;
+use std::time::Duration;
 use testkit::attributed_scan::AttributedScan;
 use testkit::random_scans::Random;
 use testkit::reference_layers::{LayerSums, layers_of};
@@ -9,8 +10,8 @@ use testkit::reference_map::{ReferenceMap, voxels_of};
 use testkit::unsynced_disk::UnsyncedDisk;
 use voxtile::integrity::{repair, verify};
 use voxtile::operations::{
-    Decay, Part, Prefer, Replay, ScanSelection, clear, convert, crop, decay, diff, merge, rebuild,
-    remove_points, remove_scans,
+    Decay, MaxAge, Part, Prefer, Replay, ScanSelection, clear, convert, crop, decay, diff, forget_old, merge,
+    rebuild, remove_points, remove_scans,
 };
 use voxtile::sensor::{Iwlo, SensorModel};
 use voxtile::{
@@ -162,6 +163,59 @@ fn hits_without_rays_are_counted_once_each() {
 
 fn config_voxel(point: [f64; 3]) -> bool {
     MapConfig::new(0.4, 3.2).unwrap().grid.voxel_of(point).is_some()
+}
+
+#[test]
+fn occupied_voxels_without_a_recent_hit_are_forgotten() {
+    let (mut forgotten, mut without, mut removed) = (0, 0, 0);
+    for seed in 0..8 {
+        let folder = tempfile::tempdir().unwrap();
+        let storage = if seed % 2 == 0 { Storage::OctoMap } else { Storage::Compact };
+        let config = MapConfig::new(0.4, 0.8).unwrap().with_range(0.0, 5.0).with_layers(all_layers());
+        drop(build(at(&folder, "map"), &config.with_storage(storage), &scans(seed, 6, 60)));
+        let open = || MapReader::open(at(&folder, "map"), 0).unwrap();
+        let (layers, before) = (layers_of(&open()), voxels_of(&open()));
+        let last_ns = |voxel: &VoxelIndex| layers.get(voxel)?.time.map(|time| time.last_ns);
+        let mut times: Vec<i64> = layers.keys().filter_map(last_ns).collect();
+        times.sort_unstable();
+        let newest = times[times.len() - 1];
+        // Without a time of their own, ages count from the last hit.
+        let (oldest, now) = match seed {
+            0..4 => (times[times.len() * 2 / 3], None),
+            4 => (newest, None),
+            _ => (newest.saturating_add(1), Some(newest.saturating_add(5))),
+        };
+        let age = Duration::from_nanos(now.unwrap_or(newest).abs_diff(oldest));
+        let rule = now.map_or(MaxAge::new(age), |now| MaxAge::new(age).with_now(now));
+        let found = forget_old(at(&folder, "map"), &rule, |_, _| {}).unwrap();
+        let is_occupied = |bits: u64| f64::from_bits(bits) >= 0.0;
+        let mut expected = before.clone();
+        expected.retain(|voxel, (bits, _)| {
+            !is_occupied(*bits) || last_ns(voxel).is_none_or(|last_ns| last_ns >= oldest)
+        });
+        assert!(voxels_of(&open()) == expected, "seed {seed}: {found:?}");
+        let left: LayerSums = layers
+            .iter()
+            .filter(|(voxel, _)| expected.contains_key(*voxel))
+            .map(|(k, v)| (*k, v.clone()))
+            .collect();
+        assert!(layers_of(&open()) == left);
+        let timeless =
+            |(voxel, (bits, _)): &(&VoxelIndex, &(u64, i32))| is_occupied(*bits) && last_ns(voxel).is_none();
+        assert_eq!(found.voxels_without_time, before.iter().filter(timeless).count() as u64);
+        assert_eq!((found.oldest_ns, found.voxels), (Some(oldest), expected.len() as u64));
+        assert_eq!(found.voxels_forgotten, (before.len() - expected.len()) as u64);
+        assert_eq!(found.tiles, open().tile_indices().len() as u64);
+        forgotten += found.voxels_forgotten;
+        without += found.voxels_without_time;
+        removed += found.tiles_removed;
+    }
+    assert!(forgotten > 100 && removed > 0, "{forgotten} {without} {removed}");
+    let folder = tempfile::tempdir().unwrap();
+    let plain = MapConfig::new(0.4, 3.2).unwrap();
+    drop(build(at(&folder, "map"), &plain, &scans(1, 1, 20)));
+    let refused = forget_old(at(&folder, "map"), &MaxAge::new(Duration::ZERO), |_, _| {}).unwrap_err();
+    assert!(refused.to_string().contains("--layers time"), "{refused}");
 }
 
 #[test]

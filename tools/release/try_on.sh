@@ -5,7 +5,8 @@
 #
 # RELEASE: the folder that run.sh wrote. SYSTEM: a Debian release, installed by debootstrap into a temporary folder
 # (default: bullseye bookworm trixie), or a folder with the root of another system, for example an unpacked container
-# image of Alpine, Fedora or Ubuntu. Such a folder gets files in /release, /opt and /tmp. Needs root, debootstrap, and a
+# image of Alpine, Fedora or Ubuntu. Such a folder gets files in /release, /opt and /tmp; with qemu-user-static and
+# binfmt_misc it may be of another architecture, such as one of `debootstrap --arch=arm64`. Needs root, debootstrap, and a
 # network for the wheel of numpy.
 set -euo pipefail
 
@@ -85,13 +86,9 @@ result() {
     fi
 }
 
-cpu=$(uname -m)
-case $cpu in
-x86_64) deb_arch=amd64 ;;
-*) deb_arch=arm64 ;;
-esac
-version=$(basename "$release"/voxtile-*-"$cpu"-unknown-linux-musl.tar.gz)
-version=${version#voxtile-} version=${version%"-$cpu-unknown-linux-musl.tar.gz"}
+archives=("$release"/voxtile-*-unknown-linux-musl.tar.gz)
+version=$(basename "${archives[0]}")
+version=${version#voxtile-} version=${version%%-[a-z]*}
 
 printf '| system | C library | archive | static archive | packages | wheel |\n|---|---|---|---|---|---|\n'
 for system in "${systems[@]}"; do
@@ -110,6 +107,11 @@ for system in "${systems[@]}"; do
     mkdir -p "$root/release"
     cp "$release"/* "$root/release/"
     cp -r "$data" "$root/release/recording"
+    cpu=$(inside uname -m)
+    case $cpu in
+    x86_64) deb_arch=amd64 ;;
+    *) deb_arch=arm64 ;;
+    esac
     libc=$(inside sh -c 'ldd --version 2>&1 | head -n 1' || true)
 
     ran_gnu="no glibc"
@@ -121,7 +123,8 @@ for system in "${systems[@]}"; do
     if python=$(inside python3 -c 'import sys; print("%d.%d" % sys.version_info[:2])' 2>/dev/null); then
         ran_wheel="Python $python is too old"
         if ((${python#3.} >= 10)); then
-            pip download --quiet --only-binary :all: --no-deps --python-version "$python" --dest "$root/release" numpy
+            pip download --quiet --only-binary :all: --no-deps --python-version "$python" \
+                --platform "manylinux_2_27_$cpu" --platform "manylinux2014_$cpu" --dest "$root/release" numpy
             ran_wheel="$(result wheel) (Python $python)"
         fi
     fi

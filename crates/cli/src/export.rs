@@ -53,6 +53,7 @@ fn options_of(args: &ExportArgs) -> voxtile::Result<ExportOptions> {
     }));
     options.with_layers = !args.no_layers;
     options.mean_points = args.mean_points;
+    options.only_classes.clone_from(&args.only_class);
     options.z_min_m = args.z_min;
     options.z_max_m = args.z_max;
     options.cell_m = args.cell;

@@ -98,6 +98,7 @@ class ExportOptions(TypedDict, total=False):
     what: Literal["occupied", "free", "all"] | None
     no_layers: bool
     mean_points: bool
+    only_class: Sequence[int]
     z_min: float | None
     z_max: float | None
     cell: float | None

@@ -54,6 +54,15 @@ impl LayerTable {
         self.brick(voxel.brick())?.get(voxel.place_in_brick(), &self.layers)
     }
 
+    /// Time stamp of the last hit in nanoseconds; `None` if no hit has a time.
+    pub(crate) fn last_ns(&self) -> Option<i64> {
+        let mut newest = None;
+        self.for_each_row(|row, base_ns, _| {
+            newest = newest.max(row.time(base_ns).map(|time| time.last_ns));
+        });
+        newest.filter(|_| self.layers.time)
+    }
+
     /// Adds the points of a scan; `first` is the tile's lowest voxel.
     pub fn add(&mut self, first: VoxelIndex, hits: &LayerHits) {
         let first = VoxelKey::from_index(first).0;

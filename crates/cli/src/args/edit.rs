@@ -1,6 +1,7 @@
 use super::help;
 use clap::{Args, ValueEnum};
 use std::path::PathBuf;
+use std::time::Duration;
 use voxtile::operations::Prefer;
 
 #[derive(Debug, Args)]
@@ -91,8 +92,16 @@ pub struct DecayArgs {
     #[arg(help = help::MAP)]
     pub map: PathBuf,
     /// Number of scans after which log-odds are halved
-    #[arg(long, value_name = "SCANS")]
-    pub halflife: f64,
+    #[arg(long, value_name = "SCANS", required_unless_present = "older_than")]
+    pub halflife: Option<f64>,
+    /// Instead: make occupied voxels unknown that no scan has hit for so long, such as 7d or 12h; free ones stay. The
+    /// map needs the layer time
+    #[arg(long, value_name = "TIME", value_parser = humantime::parse_duration,
+        conflicts_with_all = ["halflife", "scans", "forget_below"])]
+    pub older_than: Option<Duration>,
+    /// With --older-than: time from which ages count, in seconds since the epoch of the stamps [default: the last hit]
+    #[arg(long, value_name = "S", requires = "older_than", allow_negative_numbers = true)]
+    pub now: Option<f64>,
     /// Decay as if N scans had passed [default: scans since the last decay, or since the map was created]
     #[arg(long, value_name = "N")]
     pub scans: Option<u64>,

@@ -42,6 +42,9 @@ pub struct ExportArgs {
     /// .glb has colours of heights
     #[arg(long)]
     pub no_layers: bool,
+    /// Only voxels of these classes, such as 2,6, each the class of most of its points; the map needs the layer class
+    #[arg(long, value_name = "CLASSES", value_delimiter = ',')]
+    pub only_class: Vec<u8>,
     /// Files of points: write the mean of the points in a voxel in place of its center; the map needs the layer shape
     #[arg(long)]
     pub mean_points: bool,

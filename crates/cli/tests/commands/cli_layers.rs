@@ -357,3 +357,60 @@ fn meshes_of_3d_tiles_have_mean_colours_at_every_level() {
         assert!(bytes == of_plain && bytes != of_coloured, "{key:?}");
     }
 }
+
+#[test]
+fn voxels_of_classes_are_exported() {
+    let folder = TempDir::new().unwrap();
+    let map = map_of(&folder, "map", "class");
+    let all = table(&exported(&map, &folder.path().join("all.csv"), &[]));
+    let classes: BTreeSet<&String> = all.values().map(|row| &row["class"]).collect();
+    assert!(classes.len() > 2, "{classes:?}");
+    let some: Vec<&str> =
+        classes.iter().map(|class| class.as_str()).filter(|class| !class.is_empty()).take(2).collect();
+    for (name, picked) in [("one", &some[..1]), ("two", &some[..])] {
+        let (list, file) = (picked.join(","), folder.path().join(format!("{name}.csv")));
+        let found = table(&exported(&map, &file, &["--only-class", &list]));
+        let expected = all.iter().filter(|(_, row)| picked.contains(&row["class"].as_str()));
+        assert!(found.iter().eq(expected), "{name}");
+        // Another way of counting, and without layers in the file.
+        let file = text(&folder.path().join(format!("{name}.npz"))).to_owned();
+        let written = json(&["export", &map, "-o", &file, "--only-class", &list, "--no-layers", "--json"]);
+        assert_eq!(written["voxels"], found.len(), "{written}");
+    }
+    let refused = |map: &str, name: &str| {
+        let file = folder.path().join(name);
+        let (code, message) = failure(&["export", map, "-o", text(&file), "--only-class", "2"]);
+        assert!(code == 2 && !file.exists(), "{message}");
+        message
+    };
+    assert!(refused(&map, "a.bt").contains("bt does not support it"));
+    let plain = map_of(&folder, "plain", "colour");
+    for name in ["a.csv", "a.npz"] {
+        assert!(refused(&plain, name).contains("-o NEW --layers class"));
+    }
+}
+
+#[test]
+fn occupied_voxels_are_forgotten_by_their_last_hit() {
+    let folder = TempDir::new().unwrap();
+    let map = map_of(&folder, "map", "time");
+    let count = |map: &str| json(&["info", map, "--json"])["occupied"].as_u64().unwrap();
+    let before = count(&map);
+    // The two scans are a second apart.
+    let nothing = json(&["decay", &map, "--older-than", "1s", "--json"]);
+    assert_eq!((&nothing["voxels_forgotten"], count(&map)), (&0.into(), before), "{nothing}");
+    let some = json(&["decay", &map, "--older-than", "500ms", "--json"]);
+    let forgotten = some["voxels_forgotten"].as_u64().unwrap();
+    assert!(forgotten > 0 && count(&map) == before - forgotten, "{some}");
+    assert_eq!(some["oldest_ns"], 1_700_000_001_000_000_000_i64, "{some}");
+    let printed = output(&["decay", &map, "--older-than", "1d", "--now", "1800000000"]);
+    assert!(printed.contains("older than 1day") && count(&map) == 0, "{printed}");
+    let wrong = |more: &[&str]| failure(&[&["decay", &map][..], more].concat());
+    assert!(wrong(&[]).1.contains("--halflife"));
+    assert!(wrong(&["--older-than", "soon"]).1.contains("--older-than"));
+    assert!(wrong(&["--older-than", "1s", "--now", "1e300"]).1.contains("not a time"));
+    assert_eq!(wrong(&["--older-than", "1s", "--halflife", "3"]).0, 2);
+    let plain = map_of(&folder, "plain", "colour");
+    let (code, message) = failure(&["decay", &plain, "--older-than", "1s"]);
+    assert!(code == 2 && message.contains("--layers time"), "{message}");
+}

@@ -43,6 +43,8 @@ pub enum OutputOption {
     Which,
     /// The mean of the points in a voxel in place of its center.
     MeanPoints,
+    /// Only voxels of some classes.
+    Classes,
     /// Only voxels between two heights.
     Heights,
     /// Edge of the square of a file.

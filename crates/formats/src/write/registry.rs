@@ -1,4 +1,6 @@
-use super::output_format::OutputOption::{Cell, Crs, Heights, MeanPoints, Quantized, Region, Unit, Which};
+use super::output_format::OutputOption::{
+    Cell, Classes, Crs, Heights, MeanPoints, Quantized, Region, Unit, Which,
+};
 use super::*;
 use std::path::Path;
 use voxtile::octree::OctreeFormat;
@@ -58,9 +60,9 @@ const fn row(
 }
 
 /// Options of formats of points.
-const POINTS: &[OutputOption] = &[Region, Which, MeanPoints];
-const POINTS_CRS: &[OutputOption] = &[Region, Which, MeanPoints, Crs];
-const POINTS_CRS_UNIT: &[OutputOption] = &[Region, Which, MeanPoints, Crs, Unit];
+const POINTS: &[OutputOption] = &[Region, Which, Classes, MeanPoints];
+const POINTS_CRS: &[OutputOption] = &[Region, Which, Classes, MeanPoints, Crs];
+const POINTS_CRS_UNIT: &[OutputOption] = &[Region, Which, Classes, MeanPoints, Crs, Unit];
 
 const TREE_REFUSAL: &str = "an octree file always contains free and occupied voxels; omit the option";
 
@@ -79,7 +81,7 @@ const TABLE: [OutputFormat; 19] = [
         ..row("bt", Some("bt"), "OctoMap's free and occupied voxels", Writer::Octree(OctreeFormat::Bt)) },
     OutputFormat { origin: Origin::Corner, takes: &[Region], refusal: TREE_REFUSAL,
         ..row("ot", Some("ot"), "OctoMap's log-odds", Writer::Octree(OctreeFormat::Ot)) },
-    OutputFormat { is_text: true, takes: &[Region, Which, MeanPoints, Unit],
+    OutputFormat { is_text: true, takes: &[Region, Which, Classes, MeanPoints, Unit],
         ..row("xyz", Some("xyz"), "Text: x y z probability", files!(xyz::XyzSink::create)) },
     OutputFormat { takes: POINTS,
         ..row("npz", Some("npz"), "NumPy arrays: xyz, log_odds, probability, count",
@@ -103,13 +105,13 @@ const TABLE: [OutputFormat; 19] = [
     OutputFormat::GLB,
     OutputFormat { takes: &[Region, Which, Heights], needs_free_voxels: true,
         ..row("nav2", Some("pgm"), "A 2D occupancy grid for nav2: .pgm and .yaml", files!(nav2::Nav2Sink::create)) },
-    OutputFormat { takes: &[Region, Which, Heights],
+    OutputFormat { takes: &[Region, Which, Classes, Heights],
         ..row("heightmap", Some("png"), "Heights as a 16-bit PNG with a world file",
               files!(heightmap::HeightmapSink::create)) },
-    OutputFormat { takes: &[Region, Which, Heights, Crs, Unit],
+    OutputFormat { takes: &[Region, Which, Classes, Heights, Crs, Unit],
         ..row("geotiff", Some("tif"), "Heights as a GeoTIFF: highest, lowest and mean of each column of voxels",
               files!(geotiff::GeoTiffSink::create)) },
-    OutputFormat { takes: &[Region, Which, MeanPoints, Cell], origin: Origin::Point,
+    OutputFormat { takes: &[Region, Which, Classes, MeanPoints, Cell], origin: Origin::Point,
         ..row("autoware", None, "A folder with a PCD file per grid square, and Autoware's metadata",
               files!(autoware::AutowareSink::create)) },
     OutputFormat { takes: &[],
@@ -123,7 +125,7 @@ const TABLE: [OutputFormat; 19] = [
 impl OutputFormat {
     /// Surface of occupied voxels as binary glTF, which 3D Tiles also consist of.
     pub const GLB: Self = Self {
-        takes: &[Region, Which, Quantized],
+        takes: &[Region, Which, Classes, Quantized],
         ..row(
             "glb",
             Some("glb"),

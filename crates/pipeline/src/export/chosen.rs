@@ -23,6 +23,8 @@ pub(super) struct Chosen {
     pub layers: Layers,
     /// Whether the points of voxels are written in place of their centers.
     pub mean_points: bool,
+    /// Classes of the voxels; empty for all.
+    only_classes: Vec<u8>,
 }
 
 /// Offset of a point from the center of its voxel, as a share of the voxel's edge.
@@ -33,13 +35,19 @@ impl Chosen {
     ///
     /// # Errors
     ///
-    /// Mean points are requested, and the map does not have the layer.
+    /// Mean points or classes are requested, and the map does not have the layer.
     pub fn of(export: &Export<'_>, threshold: f64, layers: Layers) -> Result<Self> {
         let mean_points = export.options.mean_points;
         if mean_points && !layers.shape {
             let reason = "the map has no layer shape: build it with `layers` shape; a map that keeps its scans gets \
                           layers by `voxtile remap MAP -o NEW --layers shape`";
             return Err(Error::argument("mean_points", reason));
+        }
+        let only_classes = export.options.only_classes.clone();
+        if !only_classes.is_empty() && !layers.class {
+            let reason = "the map has no layer class: build it with `layers` class; a map that keeps its scans gets \
+                          layers by `voxtile remap MAP -o NEW --layers class`";
+            return Err(Error::argument("only_class", reason));
         }
         let default = if export.format.needs_free_voxels { WhichVoxels::All } else { WhichVoxels::Occupied };
         let (min_probability, min_log_odds, end_log_odds) = match export.options.which.unwrap_or(default) {
@@ -52,7 +60,7 @@ impl Chosen {
         };
         let layers = if export.options.with_layers { layers } else { Layers::NONE };
         let region = export.options.region;
-        Ok(Self { region, min_probability, min_log_odds, end_log_odds, layers, mean_points })
+        Ok(Self { region, min_probability, min_log_odds, end_log_odds, layers, mean_points, only_classes })
     }
 
     /// Returns whether log-odds are below the upper limit.
@@ -63,6 +71,7 @@ impl Chosen {
     /// Returns the number of voxels, without reading tiles if the map's log is sufficient.
     pub fn count(&self, map: &MapReader, stop: &Stop) -> Result<u64> {
         if self.region.is_none()
+            && self.only_classes.is_empty()
             && let Some((voxels, occupied)) = map.voxel_counts()
         {
             match self.min_probability {
@@ -79,6 +88,16 @@ impl Chosen {
 
     /// Visits the voxels tile by tile, without their layers.
     pub fn visit(&self, map: &impl MapView, mut visit: impl FnMut(Voxel)) -> Result<()> {
+        if !self.only_classes.is_empty() {
+            return self.visit_with_layers(
+                map,
+                |_| (),
+                |voxel, _, _| {
+                    visit(voxel);
+                    Ok(())
+                },
+            );
+        }
         map.for_each_occupied(self.min_probability, self.region.as_ref(), |voxel| {
             if self.is_below_end(voxel.evidence.log_odds) {
                 visit(voxel);
@@ -111,7 +130,7 @@ impl Chosen {
                 layers: made.map_or(RowLayers::NONE, |made| RowLayers::of(&made, &self.layers)),
             }
         };
-        if self.layers.is_none() && !self.mean_points {
+        if self.layers.is_none() && !self.mean_points && self.only_classes.is_empty() {
             let (failed, mut outcome) = (Stop::default(), Ok(()));
             let visited = self.visit(&Stoppable::new(map, &failed), |voxel| {
                 let tile = grid.tile_of_voxel(voxel.index);
@@ -126,21 +145,41 @@ impl Chosen {
             outcome?;
             visited?;
         } else {
-            // Reads each tile once, with its layers.
-            for index in tiles.all.clone() {
-                tiles.reach(index);
-                if !self.may_have_voxels(&grid.voxels_of_tile(index), &grid) {
-                    continue;
-                }
-                let Some(tile) = map.tile_uncached(index)? else { continue };
-                for voxel in tile.voxels_from(self.min_log_odds) {
-                    if self.is_chosen(&voxel, &grid) {
-                        put(&row_of(voxel, index, tile.layers_of(voxel.index)))?;
-                    }
+            self.visit_with_layers(
+                map,
+                |index| tiles.reach(index),
+                |voxel, index, made| put(&row_of(voxel, index, made)),
+            )?;
+        }
+        tiles.pass(tiles.all.len());
+        Ok(())
+    }
+
+    /// Visits the voxels with their tiles and layers until an error. Each tile is read once; `reach` receives its index
+    /// before.
+    fn visit_with_layers(
+        &self,
+        map: &impl MapView,
+        mut reach: impl FnMut(TileIndex),
+        mut visit: impl FnMut(Voxel, TileIndex, Option<VoxelLayers>) -> Result<()>,
+    ) -> Result<()> {
+        let grid = map.config().grid;
+        for index in map.tile_indices() {
+            reach(index);
+            if !self.may_have_voxels(&grid.voxels_of_tile(index), &grid) {
+                continue;
+            }
+            let Some(tile) = map.tile_uncached(index)? else { continue };
+            for voxel in tile.voxels_from(self.min_log_odds).filter(|voxel| self.is_chosen(voxel, &grid)) {
+                let made = tile.layers_of(voxel.index);
+                let class = made.as_ref().and_then(VoxelLayers::class);
+                if self.only_classes.is_empty()
+                    || class.is_some_and(|class| self.only_classes.contains(&class))
+                {
+                    visit(voxel, index, made)?;
                 }
             }
         }
-        tiles.pass(tiles.all.len());
         Ok(())
     }
 

@@ -23,6 +23,8 @@ pub struct ExportOptions {
     /// Writes the mean of the points that hit a voxel in place of its center. The map needs the layer shape. Voxels
     /// without a hit remain at their center.
     pub mean_points: bool,
+    /// Only voxels whose class with most votes is one of these. The map needs the layer class. Default: all.
+    pub only_classes: Vec<u8>,
     /// 2D grids: minimum height in metres.
     pub z_min_m: Option<f64>,
     /// 2D grids: maximum height in metres.
@@ -69,6 +71,7 @@ impl ExportOptions {
             which: None,
             with_layers: true,
             mean_points: false,
+            only_classes: Vec::new(),
             z_min_m: None,
             z_max_m: None,
             cell_m: None,
@@ -179,6 +182,7 @@ impl ExportOptions {
             (OutputOption::Region, self.region.is_some(), "region"),
             (OutputOption::Which, self.which.is_some(), which),
             (OutputOption::MeanPoints, self.mean_points, "mean_points"),
+            (OutputOption::Classes, !self.only_classes.is_empty(), "only_class"),
             (OutputOption::Heights, has_heights, "z_min, z_max"),
             (OutputOption::Cell, self.cell_m.is_some(), "cell"),
             (OutputOption::Quantized, self.is_quantized, "quantize"),
