@@ -19,6 +19,7 @@ mod digest;
 mod distance;
 mod export;
 mod failure;
+mod html;
 mod import;
 mod info;
 mod json;

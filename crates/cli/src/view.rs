@@ -5,15 +5,22 @@ use parking_lot::Mutex;
 use std::io::{IsTerminal, Write};
 use std::process::ExitCode;
 use std::sync::Arc;
-use voxtile_view::{View, ViewOptions};
+use voxtile_compare::CompareOptions;
+use voxtile_view::{CompareWith, View, ViewOptions};
 
 pub fn run(args: &ViewArgs) -> anyhow::Result<ExitCode> {
+    let compare = args.compare.clone().map(|map| CompareWith {
+        map,
+        options: CompareOptions::default().with_tolerance(args.tolerance),
+        progress: bar(|_| Progress::over_blocks()),
+    });
     let view = View::open(&ViewOptions {
         maps: args.maps.clone(),
+        compare,
         listen: args.listen,
         token: args.token.clone(),
         keeps_levels: !args.no_cache,
-        progress: bar(),
+        progress: bar(Progress::over_tiles),
     })?;
     report(args, &view)?;
     if !args.no_browser && !args.json && std::io::stdout().is_terminal() && has_screen() {
@@ -26,8 +33,8 @@ pub fn run(args: &ViewArgs) -> anyhow::Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// Returns a progress callback that shows a bar over tiles.
-fn bar() -> voxtile_view::Progress {
+/// Returns a progress callback that shows a bar, made for a number of parts.
+fn bar(make: impl Fn(usize) -> Progress + Send + Sync + 'static) -> voxtile_view::Progress {
     let shown: Mutex<Option<Progress>> = Mutex::new(None);
     Arc::new(move |done, all| {
         let mut shown = shown.lock();
@@ -35,8 +42,8 @@ fn bar() -> voxtile_view::Progress {
             *shown = None;
             return;
         }
-        let tiles = usize::try_from(all).unwrap_or(usize::MAX);
-        shown.get_or_insert_with(|| Progress::over_tiles(tiles)).set(done, all);
+        let parts = usize::try_from(all).unwrap_or(usize::MAX);
+        shown.get_or_insert_with(|| make(parts)).set(done, all);
     })
 }
 

@@ -363,3 +363,35 @@ fn a_slice_of_distances_shows_free_voxels_by_distance_and_obstacles_light() {
     assert!(plain().start_distances(&map, options, |_, _| {}).is_err());
     assert!(plain().with_color(ColorBy::Distance).draw(&map, |_, _| {}).is_err());
 }
+
+#[test]
+fn classes_of_a_comparison_hide_each_other_in_order() {
+    use voxtile::space::VoxelBox;
+    use voxtile_compare::VoxelClass;
+    let config = MapConfig::new(RESOLUTION_M, 4.0).unwrap();
+    let voxels = VoxelBox { min: [-2, 0, -1], end: [6, 4, 9] };
+    let picture = plain();
+    let mut drawing = picture.start_comparison(&config, voxels).unwrap();
+    // A column with each class on top of those before, from the highest to the lowest voxel.
+    for (x, class) in VoxelClass::ALL.into_iter().enumerate().map(|(k, class)| (k as i32 - 2, class)) {
+        drawing.add_compared([x, 1, 0], class, false);
+        drawing.add_compared([x, 1, 8], VoxelClass::Unchanged, false);
+    }
+    drawing.add_compared([0, 1, 3], VoxelClass::Appeared, false);
+    drawing.add_compared([0, 1, 2], VoxelClass::Vanished, true);
+    drawing.add_compared([6, 1, 0], VoxelClass::Vanished, false);
+    drawing.add_box(Aabb { min: [-1.0, 0.5, 0.0], max: [9.0, 1.0, 0.5] }, "1");
+    let drawn = drawing.finish();
+    let of = |class| colors::comparison_color(class);
+    let row: Vec<[u8; 3]> = (0..7).map(|across| cell(&drawn, [across, 0])).collect();
+    let mut wanted = VoxelClass::ALL.map(of);
+    wanted[2] = of(VoxelClass::Vanished);
+    assert_eq!(row, wanted);
+    assert_eq!(drawn.region_m.unwrap().min, [-1.0, 0.5, -0.5]);
+    // Nothing was added, or the box is empty.
+    assert_eq!(picture.start_comparison(&config, voxels).unwrap().finish().region_m, None);
+    let empty = VoxelBox { min: [0; 3], end: [0; 3] };
+    let mut drawing = picture.start_comparison(&config, empty).unwrap();
+    drawing.add_compared([0; 3], VoxelClass::Appeared, false);
+    assert_eq!(drawing.finish().region_m, None);
+}

@@ -1,10 +1,11 @@
 //! Computes responses. This may read tiles, so it runs on blocking threads.
 
+use super::comparison::ServedComparison;
 use super::distance_slice::distance_slice;
 use super::map_state::Shown;
 use super::moving::moving;
 use super::response::{Answer, Keep};
-use super::route::{MapId, Thing};
+use super::route::{At, MapId, Thing};
 use super::served_map::{Found, Makes, ServedMap};
 use hyper::StatusCode;
 use serde_json::{Value, json};
@@ -22,9 +23,13 @@ use voxtile_render::Layer;
 const TRAJECTORY: usize = 20_000;
 
 /// Returns `maps.json`, the list of maps.
-pub fn maps(maps: &[Arc<ServedMap>]) -> Answer {
+pub fn maps(maps: &[Arc<ServedMap>], comparison: Option<&ServedComparison>) -> Answer {
     let maps: Vec<Value> = maps.iter().enumerate().map(|(number, map)| describe(number, map)).collect();
-    Answer::json(json!({ "maps": maps }))
+    let mut answer = json!({ "maps": maps });
+    if let Some(comparison) = comparison {
+        answer["comparison"] = comparison.describe();
+    }
+    Answer::json(answer)
 }
 
 fn describe(number: usize, map: &ServedMap) -> Value {
@@ -62,6 +67,7 @@ fn describe(number: usize, map: &ServedMap) -> Value {
 /// Responds to a request for a map; `stop` ends the work early. Returns `None` if it needs levels that are not built yet and may not be built here.
 pub fn of_map(
     maps: &[Arc<ServedMap>],
+    comparison: Option<&ServedComparison>,
     id: &MapId,
     thing: &Thing,
     version: Option<u64>,
@@ -70,7 +76,12 @@ pub fn of_map(
 ) -> Option<Answer> {
     let nothing = || Answer::error(StatusCode::NOT_FOUND, "no such map, snapshot or node");
     let Some(map) = maps.get(id.number) else { return Some(nothing()) };
-    let answer = if thing.takes_levels() {
+    let answer = if let Some(At::Map(before)) = id.since {
+        match comparison.filter(|_| (before, id.number) == (0, 1)) {
+            Some(comparison) => comparison.answer(thing, version),
+            None => Ok(None),
+        }
+    } else if thing.takes_levels() {
         match map.shown(id, makes) {
             Ok(Found::Here(shown)) => of_levels(&shown, thing, version),
             Ok(Found::NotMade) => return None,
@@ -127,9 +138,12 @@ fn of_levels(shown: &Shown, thing: &Thing, version: Option<u64>) -> Result<Optio
             shown.layered_node(*key, *layer)?.map(|bytes| Answer::bytes(bytes, keep))
         }
         Thing::Layers => Some(Answer::json(shown.state().layer_legends()?)),
-        Thing::Query(_) | Thing::Raycast(..) | Thing::Trajectory | Thing::Moving | Thing::Distances(..) => {
-            None
-        }
+        Thing::Query(_)
+        | Thing::Raycast(..)
+        | Thing::Trajectory
+        | Thing::Moving
+        | Thing::Distances(..)
+        | Thing::Changes => None,
     })
 }
 
@@ -147,9 +161,12 @@ fn query_result(map: &AnyMap, thing: &Thing, version: Option<u64>, stop: &Stop) 
             let bytes = distance_slice(map, *around, *cap_m, stop)?;
             return Ok(Some(Answer::bytes(bytes, Keep::No)));
         }
-        Thing::Tileset | Thing::Subtree(_) | Thing::Node(..) | Thing::LayeredNode(..) | Thing::Layers => {
-            return Ok(None);
-        }
+        Thing::Tileset
+        | Thing::Subtree(_)
+        | Thing::Node(..)
+        | Thing::LayeredNode(..)
+        | Thing::Layers
+        | Thing::Changes => return Ok(None),
     };
     Ok(Some(Answer::json(answer)))
 }

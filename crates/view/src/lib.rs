@@ -10,6 +10,7 @@
 //!                      distances of a layer of voxels               distance_slice
 //!         -> metrics   text for Prometheus                          view_metrics
 //!            ServedMap one map that another process may write       served_map
+//!            comparison  classes of the voxels of two maps      comparison
 //!            MapState  one state of it: a flush or a snapshot       map_state, node_cache
 //! ```
 //!
@@ -18,6 +19,7 @@
 mod answer_memory;
 mod answers;
 mod client_stream;
+mod comparison;
 mod connections;
 mod distance_slice;
 mod map_state;
@@ -33,4 +35,4 @@ mod view;
 mod view_metrics;
 mod work;
 
-pub use view::{Progress, View, ViewOptions};
+pub use view::{CompareWith, Progress, View, ViewOptions};

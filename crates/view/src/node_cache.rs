@@ -19,10 +19,23 @@ pub fn open(map_id: Option<&str>) -> Result<NodeStore> {
             Err(error) => log::info!("{}: {error}; levels are not cached", path.display()),
         }
     }
-    let folder = std::env::temp_dir();
-    let file =
-        tempfile::tempfile().map_err(|error| Error::io(&folder, "create a temporary file in", error))?;
+    let (file, folder) = temporary_file()?;
     open_limited(file, &folder)
+}
+
+/// Opens a store in a temporary file that keeps all nodes.
+pub fn temporary() -> Result<NodeStore> {
+    let (file, folder) = temporary_file()?;
+    NodeStore::open(file, folder)
+}
+
+/// Returns an unnamed file and its folder.
+fn temporary_file() -> Result<(File, PathBuf)> {
+    let folder = std::env::temp_dir();
+    match tempfile::tempfile() {
+        Ok(file) => Ok((file, folder)),
+        Err(error) => Err(Error::io(&folder, "create a temporary file in", error)),
+    }
 }
 
 /// Opens a store with a limited file size.

@@ -29,6 +29,8 @@ pub struct MapId {
 pub enum At {
     Now,
     Snapshot(SnapshotName),
+    /// Another map of the list; only to compare with.
+    Map(usize),
 }
 
 #[derive(Clone, Debug, PartialEq)]
@@ -38,6 +40,8 @@ pub enum Thing {
     Node(NodeKey, Kind),
     /// Occupied voxels of a node, with the values of a layer.
     LayeredNode(NodeKey, Layer),
+    /// List of the changes between two maps.
+    Changes,
     /// Ranges and classes of the layers, for legends.
     Layers,
     Query(Point),
@@ -90,7 +94,12 @@ impl Thing {
     pub fn takes_levels(&self) -> bool {
         matches!(
             self,
-            Self::Tileset | Self::Subtree(_) | Self::Node(..) | Self::LayeredNode(..) | Self::Layers
+            Self::Tileset
+                | Self::Subtree(_)
+                | Self::Node(..)
+                | Self::LayeredNode(..)
+                | Self::Layers
+                | Self::Changes
         )
     }
 
@@ -100,6 +109,7 @@ impl Thing {
             "tileset.json" => Some(Self::Tileset),
             "trajectory.json" => Some(Self::Trajectory),
             "layers.json" => Some(Self::Layers),
+            "changes.json" => Some(Self::Changes),
             "moving.bin" => Some(Self::Moving),
             "distances.bin" => {
                 let [around, cap_m] = ["at", "cap"].map(|name| field(question, name));
@@ -153,11 +163,16 @@ fn finite(point: Point) -> Option<Point> {
     point.iter().all(|coordinate| coordinate.is_finite()).then_some(point)
 }
 
-/// Formats are `0` and `0@monday`, and both with `~monday` for the changes since a snapshot.
+/// Formats are `0` and `0@monday`, and both with `~monday` for the changes since a snapshot; `1~~0` are the changes from
+/// map 0 to map 1.
 impl FromStr for MapId {
     type Err = ();
 
     fn from_str(text: &str) -> Result<Self, ()> {
+        if let Some((after, before)) = text.split_once("~~") {
+            let [number, before] = [after, before].map(|number| number.parse().map_err(|_| ()));
+            return Ok(Self { number: number?, at: At::Now, since: Some(At::Map(before?)) });
+        }
         let (state, since) = match text.split_once('~') {
             Some((state, since)) => (state, Some(At::Snapshot(SnapshotName::new(since).map_err(|_| ())?))),
             None => (text, None),
@@ -207,6 +222,9 @@ mod tests {
             matches!(distances, Some(Route::Of(_, Thing::Distances([1.0, 2.0, 3.0], 0.5)))),
             "{distances:?}"
         );
+        let compared = MapId { number: 1, at: At::Now, since: Some(At::Map(0)) };
+        let changes = route("/sesame_42/maps/1~~0/changes.json", None);
+        assert_eq!(changes, Some(Route::Of(compared, Thing::Changes)));
         let name = |name| At::Snapshot(SnapshotName::new(name).unwrap());
         let since = MapId { number: 0, at: name("b"), since: Some(name("a")) };
         assert_eq!(route("/sesame_42/maps/0@b~a/tileset.json", None), Some(Route::Of(since, Thing::Tileset)));
@@ -229,6 +247,9 @@ mod tests {
             "/sesame_42/maps/0@../tileset.json",
             "/sesame_42/maps/0@.hidden/tileset.json",
             "/sesame_42/maps//tileset.json",
+            "/sesame_42/maps/1~~/tileset.json",
+            "/sesame_42/maps/1~~0~a/tileset.json",
+            "/sesame_42/maps/1~~b/tileset.json",
             "/sesame_42/maps/-1/tileset.json",
             "/sesame_42/maps/0/metadata.json",
             "/sesame_42/maps/0/node/0/0/0/0",

@@ -184,7 +184,11 @@ impl ServedMap {
     }
 
     fn state(&self, at: &At, makes: Makes) -> voxtile::Result<Found<Arc<MapState>>> {
-        let At::Snapshot(name) = at else { return Ok(Found::Here(self.now())) };
+        let name = match at {
+            At::Now => return Ok(Found::Here(self.now())),
+            At::Snapshot(name) => name,
+            At::Map(_) => return Ok(Found::Nothing),
+        };
         let Some(listed) = self.listed(name) else { return Ok(Found::Nothing) };
         if let Some(state) = self.kept(&listed) {
             return Ok(Found::Here(state));

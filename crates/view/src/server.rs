@@ -1,5 +1,6 @@
 use super::answer_memory::AnswerMemory;
 use super::client_stream::ClientStream;
+use super::comparison::ServedComparison;
 use super::connections::{Client, Connection, Connections};
 use super::response::{Answer, Body, Keep, empty};
 use super::route::{Route, version_in};
@@ -40,6 +41,7 @@ const KEEP_ALIVE_INTERVAL: Duration = Duration::from_secs(15);
 /// HTTP server that runs until a signal.
 pub struct Server {
     maps: Vec<Arc<ServedMap>>,
+    comparison: Option<Arc<ServedComparison>>,
     token: Token,
     address: SocketAddr,
     changed: watch::Receiver<u64>,
@@ -61,6 +63,7 @@ pub struct Server {
 impl Server {
     pub fn new(
         maps: Vec<Arc<ServedMap>>,
+        comparison: Option<Arc<ServedComparison>>,
         token: Token,
         address: SocketAddr,
         changed: watch::Receiver<u64>,
@@ -73,6 +76,7 @@ impl Server {
         Self {
             id,
             maps,
+            comparison,
             token,
             address,
             changed,
@@ -236,13 +240,15 @@ impl Server {
         }
         let Route::Of(id, thing) = route else {
             let server = self.clone();
-            return self.work.run(move || answers::maps(&server.maps)).await.unwrap_or_else(ending);
+            let maps = move || answers::maps(&server.maps, server.comparison.as_deref());
+            return self.work.run(maps).await.unwrap_or_else(ending);
         };
         let version = question.and_then(version_in);
         let abandoned = StopOnDrop(Stop::default());
         let ask = |makes| {
             let (server, id, thing, stop) = (self.clone(), id.clone(), thing.clone(), abandoned.0.clone());
-            move || answers::of_map(&server.maps, &id, &thing, version, makes, &stop)
+            let comparison = self.comparison.clone();
+            move || answers::of_map(&server.maps, comparison.as_deref(), &id, &thing, version, makes, &stop)
         };
         let first = match &thing {
             thing if thing.takes_scans() => &self.reading,
@@ -354,7 +360,7 @@ mod tests {
         let maps = vec![Arc::new(ServedMap::open(&path, false, Arc::new(|_, _| ())).unwrap())];
         let (_changes, changed) = watch::channel(0);
         let address = SocketAddr::from(([127, 0, 0, 1], 0));
-        Arc::new(Server::new(maps, Token::new("sesame_42").unwrap(), address, changed))
+        Arc::new(Server::new(maps, None, Token::new("sesame_42").unwrap(), address, changed))
     }
 
     #[test]

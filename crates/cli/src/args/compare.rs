@@ -34,6 +34,9 @@ pub struct CompareArgs {
     /// uncertain
     #[arg(long, requires = "output")]
     pub all: bool,
+    /// Also write a report as one HTML file: counts, a picture from above, and the largest changes with pictures
+    #[arg(long, value_name = "FILE")]
+    pub report: Option<PathBuf>,
     /// Memory for tiles, such as 256MiB or 1GB; at least what one block needs
     #[arg(long, value_name = "SIZE", default_value = "256MiB")]
     pub memory: ByteSize,

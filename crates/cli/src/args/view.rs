@@ -7,6 +7,13 @@ pub struct ViewArgs {
     /// Folders of maps, FOLDER@SNAPSHOT, or OctoMap files (.bt .ot); each map is a layer
     #[arg(required = true, value_name = "MAP")]
     pub maps: Vec<PathBuf>,
+    /// Later map: show the changes from the map to this one, by class, with a list of the largest
+    #[arg(long, value_name = "MAP")]
+    pub compare: Option<PathBuf>,
+    /// With --compare: distance along each axis within which occupied voxels are the same surface, in metres, at most 16
+    /// voxels [default: one voxel]
+    #[arg(long, value_name = "M", requires = "compare")]
+    pub tolerance: Option<f64>,
     /// Address and port of the server; port 0 selects a free one. Use 0.0.0.0:8000 for access from other machines: any
     /// client with the token can read the maps, unencrypted
     #[arg(long, value_name = "ADDRESS", default_value = "127.0.0.1:0")]

@@ -1,6 +1,5 @@
 //! `voxtile report`: writes an HTML report on a map as one file.
 
-mod html;
 mod page;
 mod svg;
 

@@ -1,41 +1,29 @@
-use super::html::Text;
 use super::svg::{Bar, histogram};
 use super::{Content, Damage, MAX_FINDINGS, Report, Sizes};
 use crate::counted::Counted;
-use base64::Engine;
-use base64::engine::general_purpose::STANDARD;
+use crate::html::{
+    Text, begin_page, begin_table, end_page, end_table, number_cell, rounded, row, write_picture,
+};
 use indicatif::{HumanBytes, HumanCount};
-use std::fmt::Display;
 use std::io::{self, Write};
 use voxtile::store::ScanRecord;
 use voxtile_render::classes::class_label;
-use voxtile_render::{Drawn, Survey, colors};
+use voxtile_render::{Survey, colors};
 
-const STYLE: &str = include_str!("style.css");
 const SECONDS_A_NS: f64 = 1e-9;
 
 impl Report {
-    /// Writes the page as HTML that is also valid XML, without scripts and links.
+    /// Writes the page.
     pub fn write(&self, out: &mut impl Write) -> io::Result<()> {
-        let name = Text(&self.name);
-        write!(
-            out,
-            "<!DOCTYPE html>\n<html xmlns=\"http://www.w3.org/1999/xhtml\" lang=\"en\">\n<head>\n\
-             <meta charset=\"utf-8\"/>\n\
-             <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\"/>\n\
-             <meta http-equiv=\"Content-Security-Policy\" \
-             content=\"default-src 'none'; img-src data:; style-src 'unsafe-inline'\"/>\n\
-             <title>{name}: map report</title>\n<style>\n{STYLE}</style>\n</head>\n<body>\n<h1>{name}</h1>\n\
-             <p class=\"faint\">A map of voxtile {}</p>\n",
-            env!("CARGO_PKG_VERSION")
-        )?;
+        let line = format!("A map of voxtile {}", env!("CARGO_PKG_VERSION"));
+        begin_page(out, &format!("{}: map report", self.name), &self.name, &line)?;
         self.write_state(out)?;
         if let Some(content) = &self.content {
             content.write(out)?;
         }
         self.write_snapshots(out)?;
         self.write_findings(out)?;
-        writeln!(out, "</body>\n</html>")
+        end_page(out)
     }
 
     /// Writes one line on the state of the files.
@@ -218,18 +206,6 @@ fn write_scans(out: &mut impl Write, scans: &[ScanRecord]) -> io::Result<()> {
     Ok(())
 }
 
-fn write_picture(out: &mut impl Write, drawn: &Drawn, caption: &str) -> io::Result<()> {
-    let mut png = Vec::new();
-    drawn.image.write_png(&mut png)?;
-    let (width, height) = (drawn.image.width_px(), drawn.image.height_px());
-    let data = STANDARD.encode(png);
-    writeln!(
-        out,
-        "<figure><img width=\"{width}\" height=\"{height}\" alt=\"{caption}\" src=\"data:image/png;base64,{data}\"/>\
-         <figcaption>{caption}</figcaption></figure>"
-    )
-}
-
 fn write_histograms(out: &mut impl Write, survey: &Survey) -> io::Result<()> {
     let bins = survey.probabilities.len();
     let bars: Vec<Bar> = (0..bins)
@@ -293,45 +269,8 @@ impl Sizes {
     }
 }
 
-/// Begins a table below a heading. A column name with a leading # is numeric.
-fn begin_table(out: &mut impl Write, heading: &str, columns: &[&str]) -> io::Result<()> {
-    write!(out, "<h2>{heading}</h2>\n<div class=\"scroll\"><table>")?;
-    if !columns.is_empty() {
-        write!(out, "<thead><tr>")?;
-        for column in columns {
-            match column.strip_prefix('#') {
-                Some(name) => write!(out, "<th class=\"number\">{name}</th>")?,
-                None => write!(out, "<th>{column}</th>")?,
-            }
-        }
-        write!(out, "</tr></thead>")?;
-    }
-    writeln!(out, "<tbody>")
-}
-
-fn end_table(out: &mut impl Write) -> io::Result<()> {
-    writeln!(out, "</tbody></table></div>")
-}
-
-fn row(out: &mut impl Write, name: &str, value: impl Display) -> io::Result<()> {
-    writeln!(out, "<tr><th>{name}</th><td>{value}</td></tr>")
-}
-
-fn number_cell(out: &mut impl Write, value: impl Display) -> io::Result<()> {
-    write!(out, "<td class=\"number\">{value}</td>")
-}
-
 fn area(area_m2: f64) -> String {
     if area_m2 >= 1e6 { format!("{:.2} km²", area_m2 / 1e6) } else { format!("{} m²", rounded(area_m2)) }
-}
-
-/// Rounds large numbers to integers and small ones to three digits.
-fn rounded(number: f64) -> String {
-    match number {
-        100.0.. => HumanCount(number.round() as u64).to_string(),
-        1.0..100.0 => format!("{number:.1}"),
-        _ => format!("{number:.3}"),
-    }
 }
 
 /// Rounds a height to hundredths of a metre. Returns 0 instead of -0.

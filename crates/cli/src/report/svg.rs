@@ -1,4 +1,4 @@
-use super::html::Text;
+use crate::html::Text;
 use indicatif::HumanCount;
 use std::fmt::{self, Write};
 

@@ -5,7 +5,7 @@ use tempfile::TempDir;
 use voxtile::{Clearing, MapConfig, MapOptions, Mapper, Scan};
 
 /// Makes a map of six scans from the origin, whose 5 x 5 rays end at `x` m in different voxels.
-fn wall_at(folder: &Path, name: &str, x: f64, resolution_m: f64, crs: Option<&str>) -> PathBuf {
+pub fn wall_at(folder: &Path, name: &str, x: f64, resolution_m: f64, crs: Option<&str>) -> PathBuf {
     let map = folder.join(name);
     let mut config = MapConfig::new(resolution_m, 10.0).unwrap().with_clearing(Clearing::guarded());
     config.crs = crs.map(str::to_owned);
@@ -208,4 +208,101 @@ fn volumes_between_maps_and_over_planes_are_printed() {
     assert!(failure(&["volume", text(&before)]).1.contains("--plane"));
     assert!(failure(&["volume", text(&before), "--plane", "nan"]).1.contains("finite height"));
     assert!(failure(&["volume", text(&before), text(&after), "--least", "-1"]).1.contains("least"));
+}
+
+/// Returns the pictures of a page, as width, height and RGB.
+fn pictures_of(page: &str) -> Vec<(usize, usize, Vec<u8>)> {
+    let pictures = page.split("src=\"data:image/png;base64,").skip(1);
+    pictures
+        .map(|rest| {
+            let data = rest.split('"').next().unwrap();
+            let png = base64::Engine::decode(&base64::engine::general_purpose::STANDARD, data).unwrap();
+            let mut reader = png::Decoder::new(std::io::Cursor::new(png)).read_info().unwrap();
+            let mut pixels = vec![0; reader.output_buffer_size().unwrap()];
+            let info = reader.next_frame(&mut pixels).unwrap();
+            (info.width as usize, info.height as usize, pixels)
+        })
+        .collect()
+}
+
+fn pixels_of(picture: &(usize, usize, Vec<u8>), color: [u8; 3]) -> usize {
+    picture.2.chunks_exact(3).filter(|pixel| **pixel == color).count()
+}
+
+#[test]
+fn a_page_has_the_counts_and_shows_the_changes() {
+    use voxtile_render::colors::{APPEARED, NOT_SEEN, UNCERTAIN, VANISHED};
+    let folder = TempDir::new().unwrap();
+    let before = wall_at(folder.path(), "<b>mon & \"tue\"", 2.05, 0.1, None);
+    let after = wall_at(folder.path(), "after", 4.05, 0.1, None);
+    let path = folder.path().join("page.html");
+    let found = json(&["compare", text(&before), text(&after), "--report", text(&path), "--json"]);
+    assert_eq!(found["report"], text(&path));
+    let page = fs::read_to_string(&path).unwrap();
+    assert!(page.contains("<h1>&lt;b&gt;mon &amp; &quot;tue&quot; → after</h1>") && !page.contains("<b>mon"));
+    for row in [
+        "vanished</td><td>earlier map</td><td>has seen the place free</td><td class=\"number\">9</td>\
+         <td class=\"number\">0.009</td><td class=\"number\">36.0 %</td>",
+        "uncertain vanished</td><td>earlier map</td><td>has perhaps seen the place free</td>\
+         <td class=\"number\">16</td>",
+        "not seen before</td><td>later map</td><td>has not observed the place</td><td class=\"number\">25</td>",
+        "appeared</td><td>later map</td><td>has seen the place free</td><td class=\"number\">0</td>",
+        "vanished</td><td class=\"number\">2.05 0.05 0.05</td><td class=\"number\">0.10 x 0.30 x 0.30</td>\
+         <td class=\"number\">0.009</td><td class=\"number\">9</td></tr>",
+        "<th>tolerance</th><td>1 voxel (0.100 m)</td>",
+        "<th>certainty</th><td>probability 0.7</td>",
+    ] {
+        assert!(page.contains(row), "{row} is missing in {page}");
+    }
+    assert!(page.contains("x 2.00 to 4.10 m, y -0.30 to 0.50 m"), "{page}");
+    // The overview, and the change from above and from the side, along the wall: 3 x 1 and 3 x 3 voxels.
+    let [overview, above, side] = &pictures_of(&page)[..] else { panic!("not three pictures: {page}") };
+    // Nothing appeared, so the color is that of the legend only.
+    let in_legend = pixels_of(overview, APPEARED);
+    assert!(in_legend > 0);
+    for color in [VANISHED, UNCERTAIN, NOT_SEEN] {
+        assert!(pixels_of(overview, color) > in_legend + 100, "{color:?}");
+    }
+    let cell = |picture: &(usize, usize, Vec<u8>), cells: usize| {
+        let edge = (pixels_of(picture, VANISHED) as f64 / cells as f64).sqrt();
+        assert!(edge.fract() == 0.0 && edge >= 16.0, "{edge}");
+        edge as usize
+    };
+    let edge = cell(above, 3);
+    cell(side, 9);
+    // From above, the five rows of the earlier wall are uncertain, three vanished, uncertain.
+    let at = |y: usize| {
+        let pixel = 3 * (above.0 / 2 + above.0 * (edge / 2 + edge * y));
+        <[u8; 3]>::try_from(&above.2[pixel..pixel + 3]).unwrap()
+    };
+    assert_eq!((above.0, above.1), (edge, 5 * edge));
+    assert_eq!([0, 1, 2, 3, 4].map(at), [UNCERTAIN, VANISHED, VANISHED, VANISHED, UNCERTAIN]);
+}
+
+#[test]
+fn a_page_of_maps_without_common_space_begins_with_the_warning() {
+    let folder = TempDir::new().unwrap();
+    let [near, far] = ["near", "far"].map(|name| folder.path().join(name));
+    let whole = wall_at(folder.path(), "whole", 60.05, 0.1, None);
+    for (part, [from, to]) in [(&near, ["0", "9"]), (&far, ["50", "70"])] {
+        output(&["crop", text(&whole), "-o", text(part), "--region", from, "-1", "-1", to, "1", "1"]);
+    }
+    let path = folder.path().join("page.html");
+    let summary = output(&["compare", text(&near), text(&far), "--report", text(&path)]);
+    assert!(summary.contains(&format!("wrote     {}", path.display())), "{summary}");
+    let page = fs::read_to_string(&path).unwrap();
+    let [warning, note, numbers] = [
+        "have no place in common",
+        "There is no picture: the maps have no occupied voxels in a common place",
+        "<h2>Occupied voxels",
+    ]
+    .map(|part| page.find(part).unwrap_or_else(|| panic!("{part}: {page}")));
+    assert!(warning < note && note < numbers, "{page}");
+    assert!(
+        pictures_of(&page).is_empty() && page.contains("No cluster of changed voxels has 8 voxels or more")
+    );
+    for (file, part) in [("-", "--report: needs a file"), ("missing/page.html", "missing")] {
+        let (code, message) = failure(&["compare", text(&near), text(&far), "--report", file]);
+        assert!(code != 0 && message.contains(part), "{message}");
+    }
 }

@@ -1,6 +1,7 @@
 //! `voxtile view` serves exactly the map to authorised clients, whatever other clients do.
 
 use crate::cli::map_with_a_passer_by;
+use crate::cli_compare::wall_at;
 use assert_cmd::cargo::cargo_bin;
 use serde_json::Value;
 use std::collections::BTreeSet;
@@ -615,6 +616,56 @@ fn snapshots_and_changes_since_them_are_shown() {
     let path = PathBuf::from(format!("{}@monday", map.display()));
     let viewer = Viewer::ready(&[&path], &folder.path().join("cache"));
     assert_eq!(viewer.finest("0").into_iter().map(|(voxel, _)| voxel).collect::<BTreeSet<_>>(), before);
+}
+
+/// The nodes contain exactly the voxels that `compare -o --all` writes, with their classes.
+#[test]
+fn changes_between_two_maps_are_shown_by_class() {
+    let folder = TempDir::new().unwrap();
+    let [before, after] =
+        [("before", 2.05), ("after", 4.05)].map(|(name, x)| wall_at(folder.path(), name, x, 0.1, None));
+    let file = folder.path().join("all.csv");
+    let compared = run(&["compare", text(&before), text(&after), "-o", text(&file), "--all", "--json"]);
+    let compared: Value = serde_json::from_str(&compared).unwrap();
+    let table = fs::read_to_string(&file).unwrap();
+    let header: Vec<&str> = table.lines().next().unwrap().split(',').collect();
+    let class = header.iter().position(|name| name.starts_with("class")).unwrap();
+    let written = table.lines().skip(1).map(|line| {
+        let cells: Vec<&str> = line.split(',').collect();
+        let center = [0, 1, 2].map(|k| (1000.0 * cells[k].parse::<f64>().unwrap()).round() as i64);
+        (center, 1 << (cells[class].parse::<u8>().unwrap() - 64))
+    });
+    let viewer = Viewer::ready(&[&before, Path::new("--compare"), &after], folder.path());
+    let shown: BTreeSet<([i64; 3], u8)> = viewer.finest("1~~0").into_iter().collect();
+    assert_eq!(shown, written.collect());
+    assert_eq!(shown.len(), 50);
+    let listed = viewer.json("maps/1~~0/changes.json");
+    assert_eq!((&listed["changes"], &listed["all"]), (&compared["changes"], &1.into()));
+    let described = &viewer.json("maps.json")["comparison"];
+    let counts = described["classes"].as_array().unwrap().iter();
+    let counts: Vec<(&str, u64)> =
+        counts.map(|class| (class["name"].as_str().unwrap(), class["voxels"].as_u64().unwrap())).collect();
+    assert_eq!(counts[..4], [("unchanged", 0), ("appeared", 0), ("vanished", 9), ("not_seen_before", 25)]);
+    assert_eq!(counts[4..], [("not_seen_after", 0), ("uncertain_appeared", 0), ("uncertain_vanished", 16)]);
+    // Each map is shown as well; other pairs are not compared.
+    assert_eq!((viewer.finest("0").len(), viewer.finest("1").len()), (25, 25));
+    for path in
+        ["maps/0~~1/tileset.json", "maps/1~~1/tileset.json", "maps/0/changes.json", "maps/1~~7/changes.json"]
+    {
+        assert_eq!(viewer.get(path).status, 404, "{path}");
+    }
+    for (arguments, part) in [
+        (&[text(&before), text(&after), "--compare", text(&after)][..], "--compare: needs exactly two maps"),
+        (&[text(&before), "--tolerance", "0.1"], "--compare"),
+        (
+            &[text(&before), "--compare", text(&after), "--tolerance", "9"],
+            "--tolerance: must be from 0 to 1.6 m",
+        ),
+    ] {
+        let failed = Command::new(cargo_bin("voxtile")).arg("view").args(arguments).output().unwrap();
+        let message = String::from_utf8_lossy(&failed.stderr).into_owned();
+        assert!(failed.status.code() == Some(2) && message.contains(part), "{message}");
+    }
 }
 
 #[test]

@@ -12,4 +12,4 @@ mod warnings;
 
 pub use list::{ListFormat, write_change_list};
 pub use voxels::{WhichChanges, changes_format, class_code, write_changed_voxels};
-pub use warnings::{check_crs, warnings_of};
+pub use warnings::{check_crs, common_voxels, warnings_of};

@@ -1,6 +1,7 @@
 use crate::map_at::AnyMap;
 use std::path::Path;
 use voxtile::mapper::MapView;
+use voxtile::space::VoxelBox;
 use voxtile::store::{Extension, InputRecord};
 use voxtile::{Clearing, Error, Result, beginning_or_difference};
 
@@ -26,7 +27,7 @@ pub fn check_crs(maps: [(&Path, &AnyMap); 2]) -> Result<Option<String>> {
 pub fn warnings_of(maps: [(&Path, &AnyMap); 2]) -> Vec<String> {
     let mut warnings = Vec::new();
     let [(before_path, before), (after_path, after)] = maps;
-    if !overlap(before, after) {
+    if common_voxels(before, after).is_none() {
         let [before, after] = [before_path, after_path].map(Path::display);
         warnings.push(format!(
             "{before} and {after} have no place in common: all voxels are not seen in the other map; check that both \
@@ -69,13 +70,11 @@ fn extension_of(map: &AnyMap) -> Option<&Extension> {
     }
 }
 
-/// Returns whether the boxes around the tiles of two maps overlap.
-fn overlap(before: &AnyMap, after: &AnyMap) -> bool {
+/// Returns the common part of the boxes around the tiles of two maps of one resolution; `None` if it is empty.
+pub fn common_voxels(before: &AnyMap, after: &AnyMap) -> Option<VoxelBox> {
     let voxels = |map: &AnyMap| Some(map.config().grid.voxels_of_tiles(map.tile_bounds()?));
-    match (voxels(before), voxels(after)) {
-        (Some(before), Some(after)) => !before.intersection(&after).is_empty(),
-        _ => false,
-    }
+    let common = voxels(before)?.intersection(&voxels(after)?);
+    (!common.is_empty()).then_some(common)
 }
 
 /// Returns the name of an input that begins with the same scan in both maps.

@@ -11,6 +11,7 @@
 //! Levels        nodes of one state of a map, identified by the versions      levels
 //!               of their tiles, so that unchanged nodes are reused
 //! Difference    two states compared node by node                             difference
+//! compared      classes of the voxels of two maps
 //! tileset       nodes as 3D Tiles                                            tileset
 //! ```
 //!
@@ -18,6 +19,7 @@
 //! computed on request; coarser nodes are stored.
 
 mod cells;
+mod compared;
 mod difference;
 mod layer_planes;
 mod layer_sums;
@@ -36,6 +38,7 @@ mod layer_tests;
 mod tests;
 
 pub use cells::Kind;
+pub use compared::{ComparedLevels, ComparedLevelsBuilder};
 pub use difference::Difference;
 pub use layer_totals::LayerTotals;
 pub use levels_layers::ColouredVoxel;

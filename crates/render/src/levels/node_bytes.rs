@@ -2,7 +2,7 @@
 //!
 //! ```text
 //!  0  [u8; 4] "VXN1"                 44  u16  voxels along the edge
-//!  4  u32     voxels, n              46  u8   0 occupied, 1 free, 2 unknown, 3 difference
+//!  4  u32     voxels, n              46  u8   0 occupied, 1 free, 2 unknown, 3 difference, 4 comparison
 //!  8  [f64;3] lower corner, metres   47  u8   layer: 0 none, 1 colour, 2 intensity, 3 class, 4 time
 //! 32  f64     edge of a voxel, m     48  f32  log-odds of value 0, and of 255, and of the map's threshold
 //! 40  u32     last scan              60  u32  0

@@ -1,3 +1,4 @@
+use super::compared::CLASSES;
 use super::layer_cells::LayerCells;
 use super::view::Change;
 use crate::Layer;
@@ -28,7 +29,15 @@ pub(super) enum Rank {
     Free,
     Occupied,
     Changed(Change),
+    /// Class of a comparison, by its position in [`CLASSES`](super::compared::CLASSES).
+    Compared(u8),
+    /// The same, of a voxel that hides all others.
+    InFront(u8),
 }
+
+/// Numbers of the first class.
+const COMPARED: u64 = 6;
+const IN_FRONT: u64 = COMPARED + CLASSES.len() as u64;
 
 impl Rank {
     fn number(self) -> u64 {
@@ -39,6 +48,8 @@ impl Rank {
             Self::Changed(Change::Same) => 3,
             Self::Changed(Change::Vanished) => 4,
             Self::Changed(Change::Appeared) => 5,
+            Self::Compared(class) => COMPARED + u64::from(class),
+            Self::InFront(class) => IN_FRONT + u64::from(class),
         }
     }
 
@@ -49,8 +60,15 @@ impl Rank {
             2 => Self::Occupied,
             3 => Self::Changed(Change::Same),
             4 => Self::Changed(Change::Vanished),
-            _ => Self::Changed(Change::Appeared),
+            5 => Self::Changed(Change::Appeared),
+            COMPARED..IN_FRONT => Self::Compared((number - COMPARED) as u8),
+            _ => Self::InFront((number - IN_FRONT) as u8),
         }
+    }
+
+    /// Returns whether relief shading applies. Classes of a comparison but the first have the colors of the legend.
+    pub fn is_shaded(self) -> bool {
+        self.is_solid() && self <= Self::Compared(0)
     }
 
     /// Returns whether the cell is or was occupied.
@@ -129,6 +147,11 @@ mod tests {
         assert_eq!(cells.at(0).rank, Rank::Unknown);
         cells.add(1, cell(Rank::Changed(Change::Same), 0.0, 0));
         assert_eq!(cells.at(1).rank, Rank::Changed(Change::Same));
+        let last = CLASSES.len() as u8 - 1;
+        for rank in [Rank::Compared(0), Rank::Compared(last), Rank::InFront(0), Rank::InFront(last)] {
+            cells.add(1, cell(rank, 0.0, 0));
+            assert_eq!(cells.at(1).rank, rank);
+        }
     }
 
     #[test]

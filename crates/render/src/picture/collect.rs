@@ -20,12 +20,23 @@ pub(super) enum Source<'a> {
 pub(super) struct Collected {
     /// `None` if no voxel was observed.
     pub known: Option<Known>,
-    pub is_difference: bool,
+    pub content: Content,
     /// Cap of the distances in metres; 0 for other pictures.
     pub max_distance_m: f64,
     pub tiles: u64,
     /// Unreadable tiles, in order.
     pub unread: Vec<TileIndex>,
+}
+
+/// Meaning of the cells.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Content {
+    /// Values of one map.
+    Values,
+    /// Changes between two states.
+    Difference,
+    /// Classes of a comparison.
+    Comparison,
 }
 
 /// Cells, and the bounds of the known ones.
@@ -67,7 +78,7 @@ impl Collected {
         unread.dedup();
         Ok(Self {
             known,
-            is_difference: matches!(source, Source::Two { .. }),
+            content: if matches!(source, Source::Two { .. }) { Content::Difference } else { Content::Values },
             max_distance_m: 0.0,
             tiles: tiles.len() as u64,
             unread: std::mem::take(unread),
@@ -106,7 +117,7 @@ impl Collected {
         let max_distance_m = options.max_distance_m;
         Ok(Self {
             known,
-            is_difference: false,
+            content: Content::Values,
             max_distance_m,
             tiles: tiles.len() as u64,
             unread: Vec::new(),
@@ -296,7 +307,7 @@ impl Collector<'_> {
 }
 
 /// Returns the first cell and the number of cells of the bounds of all known cells; `None` if there are none.
-fn seen(frame: &Frame, cells: &Cells) -> Option<([usize; 2], [usize; 2])> {
+pub(super) fn seen(frame: &Frame, cells: &Cells) -> Option<([usize; 2], [usize; 2])> {
     let (mut low, mut high) = (frame.cells, [0; 2]);
     for (place, cell) in cells.iter().enumerate() {
         if cell.rank > Rank::Unknown {

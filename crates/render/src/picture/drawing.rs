@@ -1,6 +1,7 @@
 use super::canvas::Canvas;
 use super::cells::{Cell, Rank};
-use super::collect::{Collected, Known};
+use super::collect::{Collected, Content, Known, seen};
+use super::compared::{ComparedBox, color_of_rank, legend_entries};
 use super::font;
 use super::image::Image;
 use super::layer_cells::LayerValue;
@@ -65,9 +66,10 @@ pub struct Drawing<'a> {
     picture: &'a Picture,
     grid: Grid,
     layers: Layers,
-    collected: Collected,
+    pub(super) collected: Collected,
     range: Option<[f64; 2]>,
     moving: Option<Moving>,
+    pub(super) boxes: Vec<ComparedBox>,
 }
 
 /// Minimum width of the legend.
@@ -89,9 +91,21 @@ impl Pane {
         [self.left + (across - self.first[0]) * self.zoom, self.top + row * self.zoom]
     }
 
+    /// Returns the distance of a position in cells from the lower left corner, in pixels.
+    fn offset_px(&self, position: [f64; 2]) -> [f64; 2] {
+        std::array::from_fn(|k| (position[k] - self.first[k] as f64) * self.zoom as f64)
+    }
+
+    /// Returns the pixel at a corner of cells, moved to the border if it is outside.
+    pub fn corner_px(&self, position: [f64; 2]) -> [usize; 2] {
+        let (at, size) = (self.offset_px(position), self.size());
+        let [across, up] = [0, 1].map(|k| at[k].round().clamp(0.0, size[k] as f64) as usize);
+        [self.left + across, self.top + size[1] - up]
+    }
+
     /// Returns the pixel of a position in cells, if it is inside.
     fn pixel_of(&self, position: [f64; 2]) -> Option<[usize; 2]> {
-        let at: [f64; 2] = std::array::from_fn(|k| (position[k] - self.first[k] as f64) * self.zoom as f64);
+        let at = self.offset_px(position);
         let size = self.size();
         let is_inside = (0..2).all(|k| at[k] >= 0.0 && at[k] < size[k] as f64);
         is_inside.then(|| [self.left + at[0] as usize, self.top + size[1] - 1 - at[1] as usize])
@@ -101,7 +115,8 @@ impl Pane {
 impl<'a> Drawing<'a> {
     pub(super) fn new(picture: &'a Picture, config: &MapConfig, collected: Collected) -> Self {
         let (grid, layers) = (config.grid, config.layers());
-        let mut drawing = Self { picture, grid, layers, collected, range: None, moving: None };
+        let boxes = Vec::new();
+        let mut drawing = Self { picture, grid, layers, collected, range: None, moving: None, boxes };
         drawing.range = drawing.range();
         drawing
     }
@@ -117,7 +132,7 @@ impl<'a> Drawing<'a> {
 
     /// Draws the picture.
     pub fn finish(mut self) -> Drawn {
-        let Some(known) = self.collected.known.take() else { return self.draw_nothing() };
+        let Some(known) = self.take_known() else { return self.draw_nothing() };
         let (first, cells) = with_air(&known);
         let most_px = self.picture.most_px;
         let zoom = (0..2).map(|k| most_px[k] / cells[k]).min().unwrap_or(1).clamp(1, LARGEST_ZOOM);
@@ -138,6 +153,9 @@ impl<'a> Drawing<'a> {
             moving.draw(&mut canvas, &known.frame, &pane);
         }
         self.draw_path(&mut canvas, &known, &pane, layout.dot);
+        for of_change in &self.boxes {
+            of_change.draw(&mut canvas, &known.frame, &pane, self.grid.resolution_m(), layout.dot);
+        }
         if self.picture.has_legend {
             canvas.text(layout.margin, layout.margin, layout.dot, palette::INK, &self.title(&layout));
             let legend = Legend {
@@ -159,7 +177,7 @@ impl<'a> Drawing<'a> {
             region_m: Some(Aabb { min: corner_m(voxels.min), max: corner_m(voxels.end) }),
             cell_m,
             cell_px: zoom,
-            range: self.range.filter(|_| !self.collected.is_difference),
+            range: self.range.filter(|_| self.collected.content == Content::Values),
             solid_cells: count(Rank::Occupied),
             known_cells: count(Rank::Free),
             classes,
@@ -168,6 +186,16 @@ impl<'a> Drawing<'a> {
             tiles: self.collected.tiles,
             unread: self.collected.unread,
         }
+    }
+
+    /// Returns the cells; none if a comparison has added no voxel.
+    fn take_known(&mut self) -> Option<Known> {
+        let known = self.collected.known.take()?;
+        if self.collected.content != Content::Comparison {
+            return Some(known);
+        }
+        let (first, count) = seen(&known.frame, &known.cells)?;
+        Some(Known { first, count, ..known })
     }
 
     /// Draws a picture without cells.
@@ -203,9 +231,10 @@ impl<'a> Drawing<'a> {
     }
 
     fn scale(&self) -> Scale {
-        match self.range {
-            _ if self.collected.is_difference => Scale::Change,
-            range => Scale::Values { color_by: self.picture.color_by, range },
+        match self.collected.content {
+            Content::Values => Scale::Values { color_by: self.picture.color_by, range: self.range },
+            Content::Difference => Scale::Change,
+            Content::Comparison => Scale::Comparison,
         }
     }
 
@@ -225,6 +254,9 @@ impl<'a> Drawing<'a> {
 
     /// Returns the entries of the legend.
     fn entries(&self, classes: &[(u8, u64)], cells_without_value: u64) -> Vec<Entry> {
+        if self.collected.content == Content::Comparison {
+            return legend_entries();
+        }
         let class =
             |&(class, _): &(u8, u64)| Entry { color: Some(class_color(class)), label: class_label(class) };
         let mut entries: Vec<Entry> = classes.iter().map(class).collect();
@@ -295,7 +327,7 @@ impl<'a> Drawing<'a> {
                 let cell = known.cell([across, up]);
                 let Some(color) = self.color(known, [across, up], cell) else { continue };
                 let light =
-                    if cell.rank.is_solid() { self.light(known, [across, up], cell.near) } else { 1.0 };
+                    if cell.rank.is_shaded() { self.light(known, [across, up], cell.near) } else { 1.0 };
                 let [left, top] = pane.pixel([across, up]);
                 canvas.fill(left, top, [pane.zoom; 2], lit(color, light), 1.0);
             }
@@ -318,6 +350,7 @@ impl<'a> Drawing<'a> {
             Rank::Changed(Change::Same) => Some(palette::SAME),
             Rank::Changed(Change::Vanished) => Some(palette::VANISHED),
             Rank::Changed(Change::Appeared) => Some(palette::APPEARED),
+            Rank::Compared(class) | Rank::InFront(class) => color_of_rank(class),
             Rank::Occupied if self.picture.color_by == ColorBy::Distance => Some(palette::INK),
             Rank::Occupied => Some(match &known.cells.layer {
                 Some(layer) => match layer.at(known.place(at)) {
@@ -329,7 +362,7 @@ impl<'a> Drawing<'a> {
                 None => value_color(),
             }),
             Rank::Free => match self.picture.color_by {
-                _ if self.collected.is_difference => Some(palette::FREE),
+                _ if self.collected.content != Content::Values => Some(palette::FREE),
                 ColorBy::Height | ColorBy::Probability | ColorBy::Layer(_) => Some(palette::FREE),
                 ColorBy::Distance => Some(value_color()),
                 ColorBy::Count | ColorBy::LastScan => Some(mixed(palette::UNKNOWN, value_color(), 0.4)),
@@ -417,7 +450,7 @@ impl<'a> Drawing<'a> {
         // A radius of 0.2 m, limited to a few pixels: a wider line would hide the streets of a large map.
         let most = if self.picture.has_legend { dot + 1 } else { 1 };
         let radius = ((0.2 * pixels_a_metre) as usize).clamp(usize::from(self.picture.has_legend), most);
-        let color = if self.collected.is_difference { palette::INK } else { palette::PATH };
+        let color = if self.collected.content == Content::Values { palette::PATH } else { palette::INK };
         canvas.path(middles.into_iter(), radius, color);
     }
 }

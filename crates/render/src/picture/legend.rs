@@ -32,6 +32,8 @@ pub enum Scale {
     Values { color_by: ColorBy, range: Option<[f64; 2]> },
     /// Change from one state to another.
     Change,
+    /// Classes of a comparison, which are entries.
+    Comparison,
 }
 
 /// Top of the first row of entries, below the other parts of the legend, in dots.
@@ -115,8 +117,10 @@ impl Legend {
         let swatch = right.saturating_sub(bar + 74 * dot);
         let is_of_distances = matches!(self.scale, Scale::Values { color_by: ColorBy::Distance, .. });
         let first = if is_of_distances { (palette::INK, "obstacle") } else { (palette::FREE, "free") };
-        for (top, (color, label)) in [(foot + 4 * dot, first), (line, (palette::UNKNOWN, "unknown"))] {
-            draw_swatch(canvas, [swatch, top], dot, color, label);
+        if !matches!(self.scale, Scale::Comparison) {
+            for (top, (color, label)) in [(foot + 4 * dot, first), (line, (palette::UNKNOWN, "unknown"))] {
+                draw_swatch(canvas, [swatch, top], dot, color, label);
+            }
         }
         if self.has_path {
             let (sensor, top) = (swatch.saturating_sub(60 * dot), foot + 4 * dot);
@@ -136,6 +140,9 @@ impl Legend {
     fn draw_scale(&self, canvas: &mut Canvas, [right, bar]: [usize; 2], foot: usize, dot: usize) {
         let (top, bottom) = (foot + 4 * dot, foot + 22 * dot);
         let Scale::Values { color_by, range } = &self.scale else {
+            if matches!(self.scale, Scale::Comparison) {
+                return;
+            }
             let (left, line) = (right - bar, bottom - font::HEIGHT * dot);
             draw_swatch(canvas, [left, top], dot, palette::APPEARED, "appeared");
             draw_swatch(canvas, [left, line], dot, palette::VANISHED, "vanished");

@@ -6,12 +6,14 @@
 //! Cells     the best observation of each cell                  cells, layer_cells, collect
 //! Drawing   cells, grid, moving points, trajectory, legend     drawing, moving, legend, scale, time_labels
 //! Canvas    pixels, boxes, letters                             canvas, font, palette, image
+//! compared  classes of the voxels of two maps, and boxes around changes
 //! OverTime  panels of a local map at several times             over_time
 //! ```
 
 mod canvas;
 mod cells;
 mod collect;
+mod compared;
 mod drawing;
 mod font;
 mod frame;
@@ -35,8 +37,10 @@ pub use view::{Change, ColorBy, SideAxis, View};
 
 /// Colors of pictures, as red, green and blue in sRGB.
 pub mod colors {
+    pub use super::compared::comparison_color;
     pub(crate) use super::palette::vivid;
     pub use super::palette::{
-        APPEARED, FREE, MOVING, NO_VALUE, PATH, Rgb, SAME, UNKNOWN, VANISHED, color_of,
+        APPEARED, FREE, MOVING, NO_VALUE, NOT_SEEN, PATH, Rgb, SAME, UNCERTAIN, UNCHANGED, UNKNOWN, VANISHED,
+        color_of,
     };
 }

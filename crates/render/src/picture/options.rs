@@ -188,7 +188,7 @@ impl Picture {
         Ok(Drawing::new(self, map.config(), collected))
     }
 
-    fn check(&self) -> Result<()> {
+    pub(super) fn check(&self) -> Result<()> {
         if let View::Slice { z_m, thickness_m } = self.view
             && !(z_m.is_finite() && thickness_m.is_finite() && thickness_m >= 0.0)
         {

@@ -24,6 +24,13 @@ pub const VANISHED: Rgb = [255, 153, 31];
 /// Occupied only after.
 pub const APPEARED: Rgb = [74, 144, 255];
 
+/// In a comparison, occupied in both maps. It is dark, so that the other classes stand out.
+pub const UNCHANGED: Rgb = [74, 82, 96];
+/// In a comparison, occupied in one map and unknown in the other.
+pub const NOT_SEEN: Rgb = [158, 162, 170];
+/// In a comparison, occupied in one map and perhaps free in the other.
+pub const UNCERTAIN: Rgb = [255, 240, 178];
+
 /// Occupied voxels without a value of the layer that is shown.
 pub const NO_VALUE: Rgb = [92, 98, 108];
 
@@ -174,6 +181,22 @@ mod tests {
                 let [first, second] = [MOVING, other].map(|rgb| seen(rgb, sight));
                 let distance = (0..3).map(|k| (first[k] - second[k]).powi(2)).sum::<f64>().sqrt();
                 assert!(distance > 0.11, "{other:?}: {distance}");
+            }
+        }
+    }
+
+    #[test]
+    fn classes_of_a_comparison_are_distinct_with_color_blindness() {
+        // The limits of relief shading, which only unchanged voxels have.
+        let unchanged = [0.72, 1.0, 1.22].map(|light| lit(UNCHANGED, light));
+        let others = [UNKNOWN, NOT_SEEN, UNCERTAIN, VANISHED, APPEARED];
+        for (number, color) in others.into_iter().enumerate() {
+            for other in others[..number].iter().copied().chain(unchanged) {
+                for sight in &SIGHTS {
+                    let [first, second] = [color, other].map(|rgb| seen(rgb, sight));
+                    let distance = (0..3).map(|k| (first[k] - second[k]).powi(2)).sum::<f64>().sqrt();
+                    assert!(distance > 0.11, "{color:?} and {other:?}: {distance}");
+                }
             }
         }
     }

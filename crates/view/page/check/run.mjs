@@ -6,6 +6,7 @@ import { join } from 'node:path';
 import { createInterface } from 'node:readline';
 import { inflateSync } from 'node:zlib';
 import { Browser } from './browser.mjs';
+import { checkChanges } from './changes.mjs';
 
 const voxtile = process.env.VOXTILE;
 const work = mkdtempSync(join(tmpdir(), 'voxtile-view-'));
@@ -341,6 +342,9 @@ try {
   await colourBy('height');
   assert.deepEqual(browser.errors, []);
   step(`layers: ${byColour} pixels in colour, ${byClass} by class, ${byIntensity} by intensity, ${byAge} by age; they follow a build and a snapshot`);
+  const changes = await checkChanges({ browser, view, run, exported, countPixels: count, work });
+  server = plain;
+  step(`changes between two maps, ${changes}`);
   await browser.open('about:blank');
   await browser.open(url);
   await browser.ready();

@@ -23,7 +23,7 @@ export class Layer {
     this.group = new THREE.Group();
     this.near = new THREE.Group();
     this.group.add(this.near);
-    const kind = id.includes('~') ? KIND.change : KIND.occupied;
+    const kind = id.includes('~~') ? KIND.compared : id.includes('~') ? KIND.change : KIND.occupied;
     this.material = makeMaterial(kind, viewer.shared);
     this.materials = { free: makeMaterial(KIND.free, viewer.shared), unknown: makeMaterial(KIND.unknown, viewer.shared) };
     if (hue) tintLayer(this.material, hue);
@@ -217,7 +217,8 @@ export class Layer {
 
   // Loads free and unknown voxels of the nearest tiles in view.
   updateNear() {
-    const kinds = ['free', 'unknown'].filter((kind) => this.viewer.shows[kind]);
+    // The nodes of a comparison have occupied voxels only.
+    const kinds = ['free', 'unknown'].filter((kind) => this.viewer.shows[kind] && !this.id.includes('~~'));
     const wanted = new Set();
     if (kinds.length) {
       const leaves = this.meshes().filter(([mesh]) => mesh.userData.node.edge < 1.5 * this.map.resolution_m);

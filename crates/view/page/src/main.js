@@ -1,5 +1,6 @@
 // Controls of the page.
 
+import { Comparison } from './comparison.js';
 import { coloursOf, readDistances } from './distances.js';
 import { BY_LAYER, NO_VALUE, className, endsOf, joined, timeText } from './layers.js';
 import { readLink, writeLink } from './link.js';
@@ -36,6 +37,13 @@ try {
   say(`Cannot draw 3D in this browser: ${error.message}`);
   throw error;
 }
+const swatchOf = (colour) => {
+  const swatch = document.createElement('span');
+  swatch.className = 'swatch';
+  swatch.style.background = `rgb(${colour})`;
+  return swatch;
+};
+const comparison = new Comparison({ viewer, json, say, swatchOf });
 let link = readLink();
 let maps = [];
 let tool = 'query';
@@ -67,6 +75,7 @@ const OPEN = ['0', '1000', '0', '1000', '0', '1000'];
 // The page lists the snapshots of the first map. A map without a snapshot of the chosen name is shown in its current
 // state.
 const idOf = (map) => {
+  if (comparison.isShown) return comparison.id;
   const [at, since] = ['snapshot', 'since'].map((id) => $(id).value)
     .map((chosen) => map.snapshots.some(({ name }) => name === chosen) && chosen);
   return map.id + (at ? `@${at}` : '') + (since ? `~${since}` : '');
@@ -114,7 +123,7 @@ function describe() {
 }
 
 async function readMaps() {
-  ({ maps } = await json('maps.json'));
+  maps = comparison.mapsOf(await json('maps.json'));
   for (const map of maps) [map.low, map.high] = map.bounds ? [map.bounds.min[2], map.bounds.max[2]] : [0, 1];
   describe();
 }
@@ -129,7 +138,7 @@ function allBounds() {
 // Reads the occupied extent from the tileset's root, for colours, cuts and the first view.
 async function readExtents() {
   await Promise.all(maps.map(async (map) => {
-    const { root } = await json(`maps/${map.id}/tileset.json`);
+    const { root } = await json(`maps/${comparison.isShown ? idOf(map) : map.id}/tileset.json`);
     if (!root.children) return;
     const box = root.boundingVolume.box;
     const half = [box[3], box[7], box[11]];
@@ -285,13 +294,6 @@ function followCamera() {
 
 // --- Colours and cuts
 
-const swatchOf = (colour) => {
-  const swatch = document.createElement('span');
-  swatch.className = 'swatch';
-  swatch.style.background = `rgb(${colour})`;
-  return swatch;
-};
-
 // Returns the joined legend of the chosen layer, of all maps that have it; `null` if it cannot be loaded.
 async function legendOf(shown) {
   const name = BY_LAYER[$('colour').value];
@@ -352,7 +354,8 @@ function paint() {
   const scale = viewer.layers[0]?.scale ?? { least: 0, most: 3.5 };
   $('threshold-out').value = probabilityOf(logOddsOf(scale, viewer.threshold)).toFixed(3);
   const map = maps[0];
-  const isChange = Boolean($('since').value);
+  const isChange = Boolean($('since').value) || comparison.isShown;
+  $('colours').hidden = comparison.isShown;
   const ends = {
     height: [metres(map.low), metres(map.high)],
     probability: [0, 255].map((value) => probabilityOf(logOddsOf(scale, value)).toFixed(2)),
@@ -361,7 +364,9 @@ function paint() {
   }[viewer.colour] ?? paintLegend();
   if (isChange || !BY_LAYER[viewer.colour]) $('legend-classes').hidden = true;
   $('legend').hidden = isChange || ['rgb', 'class'].includes(viewer.colour);
-  if (isChange) {
+  if (comparison.isShown) {
+    $('legend-ends').replaceChildren();
+  } else if (isChange) {
     const names = ['appeared', 'vanished', 'unchanged'].map((name, k) => {
       const span = document.createElement('span');
       span.append(swatchOf(CHANGES[k]), name);
@@ -417,8 +422,10 @@ async function ask(layer, node, center) {
     const result = await json(`maps/${layer.id.split('~')[0]}/query?x=${center[0]}&y=${center[1]}&z=${center[2]}`);
     answered = { ...result, isCoarse };
     const number = (k, digits) => (k === null ? 'unknown' : k.toFixed(digits));
+    const before = comparison.isShown ? await json(`maps/${comparison.info.before}/query?x=${center[0]}&y=${center[1]}&z=${center[2]}`) : null;
     answer([
       ['at', place(center)],
+      ...(before ? [['before', `${before.state}, probability ${number(before.probability, 4)}`], ['after', '']] : []),
       ...(isCoarse ? [['voxel', `of ${metres(node.edge)} (zoom in for single voxels)`]] : []),
       ['state', result.state],
       ['probability', number(result.probability, 4)],
@@ -678,6 +685,13 @@ $('grid').addEventListener('change', () => {
   viewer.wake();
 });
 for (const id of ['snapshot', 'since']) $(id).addEventListener('change', showMaps);
+$('compared').addEventListener('change', async () => {
+  await readMaps();
+  await readExtents().catch(() => {});
+  viewer.surround(allBounds());
+  showMaps();
+  cut();
+});
 for (const one of ['query', 'measure', 'sight']) $(`tool-${one}`).addEventListener('click', () => choose(one));
 $('copy').addEventListener('click', () => navigator.clipboard?.writeText(answered.voxel_center_m.join(' ')).catch((error) => say(error.message)));
 $('fit').addEventListener('click', () => viewer.flight.fit(viewer.box));
@@ -715,7 +729,7 @@ $('theme').addEventListener('click', () => theme(!document.documentElement.class
 
 const keys = {
   KeyF: () => $('fit').click(), KeyT: () => $('top').click(), KeyL: () => $('side').click(), KeyG: () => $('walk').click(),
-  KeyP: () => showPanel($('panel').hidden), KeyM: () => choose('measure'), KeyV: () => choose('sight'), Escape: () => choose('query'),
+  KeyN: () => comparison.step(1), KeyB: () => comparison.step(-1), KeyP: () => showPanel($('panel').hidden), KeyM: () => choose('measure'), KeyV: () => choose('sight'), Escape: () => choose('query'),
   Slash: () => $('help').click(),
 };
 window.addEventListener('keydown', (event) => {

@@ -1,6 +1,6 @@
 import * as THREE from 'three';
 import { NO_VALUE } from './layers.js';
-import { CHANGES, MOVING, ramp } from './palette.js';
+import { CHANGES, CLASSES, MOVING, ramp } from './palette.js';
 import { KIND } from './node.js';
 
 const vertex = /* glsl */ `
@@ -13,14 +13,24 @@ uniform int colourBy;
 uniform vec2 range;
 uniform float lastScan;
 uniform int kind;
+uniform int classes;
+uniform vec3 classColours[7];
 varying vec2 corner;
 varying float share;
 varying float light;
 varying float change;
+varying vec3 classColour;
 varying vec4 layerColour;
 void main() {
   int side = int(place.w + 0.5);
   bool isSeen = kind != 0 || (levels.x >= threshold && (levels.y < 0.5 || levels.y - 1.0 < threshold));
+  if (kind == 4) {
+    int own = int(levels.x + 0.5) & classes;
+    isSeen = own != 0 && (int(levels.y + 0.5) & classes) == 0;
+    // Appeared and vanished voxels hide uncertain ones, and these those that one map has not seen, and unchanged ones.
+    classColour = (own & 2) != 0 ? classColours[1] : (own & 4) != 0 ? classColours[2] : (own & 96) != 0 ? classColours[5]
+      : (own & 24) != 0 ? classColours[3] : classColours[0];
+  }
   vec3 mid = (modelMatrix * vec4(place.xyz + 0.5, 1.0)).xyz;
   isSeen = isSeen && all(greaterThanEqual(mid, low)) && all(lessThanEqual(mid, high));
   if (!isSeen) { gl_Position = vec4(2.0, 2.0, 2.0, 1.0); return; }
@@ -52,11 +62,13 @@ varying vec2 corner;
 varying float share;
 varying float light;
 varying float change;
+varying vec3 classColour;
 varying vec4 layerColour;
 vec3 linearOf(vec3 c) { return mix(c / 12.92, pow((c + 0.055) / 1.055, vec3(2.4)), step(0.04045, c)); }
 void main() {
   vec3 colour = texture2D(ramp, vec2(share, 0.5)).rgb;
   if (kind == 3) colour = change < 1.5 ? changes[0] : change < 2.5 ? changes[1] : changes[2];
+  else if (kind == 4) colour = classColour;
   else if (isPainted) colour = layerColour.a > 0.5 ? linearOf(layerColour.rgb) : noValue;
   else if (tint.a > 0.0) colour = tint.rgb * (0.55 + 0.45 * share);
   // Draw borders if a voxel is large enough on the screen.
@@ -85,6 +97,7 @@ export function makeMaterial(kind, shared) {
       kind: { value: kind },
       ramp: { value: ramp },
       changes: { value: CHANGES.map(linear) },
+      classColours: { value: CLASSES.map(linear) },
       tint: { value: own ? new THREE.Vector4(own.r, own.g, own.b, 1) : new THREE.Vector4(0, 0, 0, 0) },
       threshold: { value: 0 },
       range: { value: new THREE.Vector2(0, 1) },
@@ -141,4 +154,6 @@ export const sharedUniforms = () => ({
   low: { value: new THREE.Vector3(-Infinity, -Infinity, -Infinity) },
   high: { value: new THREE.Vector3(Infinity, Infinity, Infinity) },
   colourBy: { value: 0 },
+  // Classes of a comparison that are shown, as bits.
+  classes: { value: 127 },
 });

@@ -7,7 +7,7 @@ const HEAD = 64;
 const MOST = 130;
 const grid = new Uint16Array(MOST * MOST * MOST);
 
-export const KIND = { occupied: 0, free: 1, unknown: 2, change: 3 };
+export const KIND = { occupied: 0, free: 1, unknown: 2, change: 3, compared: 4 };
 
 function steps(bytes) {
   const places = new Uint8Array(bytes.length);
@@ -47,14 +47,17 @@ const BESIDE = [1, -1, MOST, -MOST, MOST * MOST, -MOST * MOST];
 
 // Returns the faces that any threshold can make visible: position and direction (+x -x +y -y +z -z), the value of the
 // voxel, that of its neighbour plus one (0 without a neighbour), and the count; and its colour by a layer, if `paint` has
-// one for each voxel. Only occupied voxels (kind 0) have values to compare.
+// one for each voxel. Only occupied voxels (kind 0) have values to compare. Voxels of a comparison have sets of classes: a
+// face is visible if some class of its voxel is shown, and none of its neighbour.
 export function facesOf(node, paint) {
   const { count, x, y, z, value, counts, kind } = node;
-  for (let i = 0; i < count; i++) grid[cell(x[i], y[i], z[i])] = kind === KIND.occupied ? value[i] + 1 : 256;
+  const isCompared = kind === KIND.compared;
+  for (let i = 0; i < count; i++) grid[cell(x[i], y[i], z[i])] = kind === KIND.occupied ? value[i] + 1 : isCompared ? value[i] : 256;
+  const isHidden = (own, beside) => (isCompared ? (own & ~beside) === 0 : beside >= own);
   let n = 0;
   for (let i = 0; i < count; i++) {
     const at = cell(x[i], y[i], z[i]);
-    for (const step of BESIDE) if (grid[at + step] < grid[at]) n++;
+    for (const step of BESIDE) if (!isHidden(grid[at], grid[at + step])) n++;
   }
   const places = new Uint8Array(4 * n);
   const levels = new Uint8Array(4 * n);
@@ -64,7 +67,7 @@ export function facesOf(node, paint) {
     const at = cell(x[i], y[i], z[i]);
     for (let side = 0; side < 6; side++) {
       const beside = grid[at + BESIDE[side]];
-      if (beside >= grid[at]) continue;
+      if (isHidden(grid[at], beside)) continue;
       places.set([x[i], y[i], z[i], side], 4 * n);
       levels.set([value[i], beside, counts[i], 0], 4 * n);
       paints?.set(paint.subarray(4 * i, 4 * i + 4), 4 * n);

@@ -8,8 +8,8 @@ import { KIND } from './node.js';
 import { Overlays } from './overlays.js';
 
 const MOST_CALLS = 200;
-// Draw calls reserved for overlays: trajectory, sensor, moving points, distances, marks, grid, bounding box.
-const OVERLAY_CALLS = 9;
+// Draw calls reserved for overlays: trajectory, sensor, moving points, distances, marks, change, grid, bounding box.
+const OVERLAY_CALLS = 10;
 
 // Scene with layers, overlays and camera. Draws only after changes.
 export class Viewer {
@@ -30,6 +30,8 @@ export class Viewer {
     this.layers = [];
     this.shows = { occupied: true, free: false, unknown: false };
     this.threshold = 0;
+    // Classes of a comparison that are shown, as bits.
+    this.classes = 127;
     this.cut = { low: [-Infinity, -Infinity, -Infinity], high: [Infinity, Infinity, Infinity] };
     this.colour = 'height';
     this.listeners = [];
@@ -151,6 +153,7 @@ export class Viewer {
   // Sets the uniforms from the controls.
   paint() {
     this.shared.colourBy.value = ['height', 'probability', 'count', 'scan'].indexOf(this.colour);
+    this.shared.classes.value = this.classes;
     this.shared.low.value.set(...this.toScene(this.cut.low));
     this.shared.high.value.set(...this.toScene(this.cut.high));
     for (const layer of this.layers) {
@@ -168,6 +171,7 @@ export class Viewer {
   isSeen(layer, node, voxel, at) {
     if (!this.shows.occupied) return false;
     if (node.kind === KIND.occupied && node.value[voxel] < this.threshold) return false;
+    if (node.kind === KIND.compared && (node.value[voxel] & this.classes) === 0) return false;
     return at.every((k, axis) => {
       const mid = node.corner[axis] + (k + 0.5) * node.edge;
       return mid >= this.cut.low[axis] && mid <= this.cut.high[axis];

@@ -1,18 +1,28 @@
+//! `voxtile compare`: changes between two maps, as a summary, lists, voxels and a page.
+
+mod page;
+mod pictures;
+
 use crate::args::CompareArgs;
 use crate::counted::Counted;
 use crate::json;
 use crate::part::region_of;
+use crate::picture::name_of;
 use crate::progress::Progress;
 use crate::quiet::summary_out;
 use crate::stop_signal;
 use indicatif::HumanCount;
+use page::Page;
+use pictures::Pictures;
 use serde::Serialize;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Instant;
 use voxtile::mapper::MapView;
+use voxtile::{Error, Result};
 use voxtile_compare::{Clusters, CompareOptions, Comparison, EpochCounts, compare};
+use voxtile_pipeline::output::{OutputFile, is_standard_output};
 use voxtile_pipeline::{
     AnyMap, ListFormat, WhichChanges, changes_format, check_crs, memory, read_any_maps, warnings_of,
     write_change_list, write_changed_voxels,
@@ -32,6 +42,7 @@ struct Report {
     list: Option<String>,
     output: Option<String>,
     output_voxels: Option<u64>,
+    report: Option<String>,
     seconds: f64,
     peak_rss_bytes: Option<u64>,
 }
@@ -51,6 +62,7 @@ pub fn run(args: &CompareArgs) -> anyhow::Result<ExitCode> {
     let stop = stop_signal::catch_unfinished()?;
     args.list.as_deref().map(ListFormat::of_path).transpose()?;
     args.output.as_deref().map(changes_format).transpose()?;
+    let mut page = args.report.as_deref().map(page_file).transpose()?;
     let options = CompareOptions::default()
         .with_tolerance(args.tolerance)
         .with_min_voxels(args.min_voxels)
@@ -59,8 +71,13 @@ pub fn run(args: &CompareArgs) -> anyhow::Result<ExitCode> {
         .with_memory(usize::try_from(args.memory.as_u64()).unwrap_or(usize::MAX))
         .with_stop(stop);
     let mut report = read_any_maps(&args.before, &args.after, |before, after| {
-        report(args, &options, [(&args.before, before), (&args.after, after)])
+        let report = report(args, &options, [(&args.before, before), (&args.after, after)])?;
+        if let Some(file) = &mut page {
+            write_page(&report, args, &options, [before, after], file)?;
+        }
+        Ok(report)
     })?;
+    page.map(OutputFile::finish).transpose()?;
     report.seconds = started.elapsed().as_secs_f64();
     report.peak_rss_bytes = memory::peak_bytes();
     let mut out = summary_out(args.json);
@@ -106,9 +123,33 @@ fn report(
         list: name(&args.list),
         output: name(&args.output),
         output_voxels,
+        report: name(&args.report),
         seconds: 0.0,
         peak_rss_bytes: None,
     })
+}
+
+/// Creates the file of the page before maps are read, so that a wrong path is reported at once.
+fn page_file(path: &Path) -> Result<OutputFile> {
+    if is_standard_output(path) {
+        let reason = "needs a file, because standard output is used for the summary";
+        return Err(Error::argument("report", reason));
+    }
+    OutputFile::create(path)
+}
+
+fn write_page(
+    report: &Report,
+    args: &CompareArgs,
+    options: &CompareOptions,
+    maps: [&AnyMap; 2],
+    file: &mut OutputFile,
+) -> Result<()> {
+    let names = [&args.before, &args.after].map(|path| name_of(path));
+    let title = format!("{} to {}: {} m voxels", names[0], names[1], report.resolution_m);
+    let pictures = Pictures::draw(maps, options, &report.comparison, &title)?;
+    let written = Page { report, options, names, pictures }.write(file.out());
+    file.written(written)
 }
 
 impl Side {
@@ -172,7 +213,7 @@ impl Report {
         if rest > 0 && self.list.is_none() {
             writeln!(out, "          and {rest} more: --list writes all")?;
         }
-        for path in [&self.list, &self.output].into_iter().flatten() {
+        for path in [&self.list, &self.output, &self.report].into_iter().flatten() {
             writeln!(out, "wrote     {path}")?;
         }
         Ok(())
