@@ -1,4 +1,5 @@
 use crate::components::Sums;
+use crate::voxel_class::VoxelClass;
 use rustc_hash::FxHashMap;
 use serde::Serialize;
 use voxtile::{Aabb, Grid, Point, VoxelIndex};
@@ -26,6 +27,21 @@ pub struct Comparison {
     /// Number of the change of each part of it in a block, by the lowest voxel of the part.
     #[serde(skip)]
     pub(crate) change_of_part: FxHashMap<VoxelIndex, u32>,
+}
+
+impl Comparison {
+    /// Number of voxels of a class, small clusters included; unchanged voxels are those of the later map.
+    pub fn voxels_of(&self, class: VoxelClass) -> u64 {
+        match class {
+            VoxelClass::Unchanged => self.after.unchanged,
+            VoxelClass::Appeared => self.after.changed,
+            VoxelClass::Vanished => self.before.changed,
+            VoxelClass::NotSeenBefore => self.after.not_seen,
+            VoxelClass::NotSeenAfter => self.before.not_seen,
+            VoxelClass::UncertainAppeared => self.after.uncertain,
+            VoxelClass::UncertainVanished => self.before.uncertain,
+        }
+    }
 }
 
 /// Counts of the occupied voxels of a map that is compared with another one.

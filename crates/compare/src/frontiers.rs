@@ -1,19 +1,14 @@
-use crate::bits::Bits;
-use crate::block_bits::BlockBits;
-use crate::blocks::{Cube, blocks_of};
 use crate::change::{bounds_m, center_m};
 use crate::components::Components;
-use crate::joined::{BlockParts, Joined};
-use crate::mask_reader::MaskReader;
-use crate::sweep::Sweep;
-use crate::tile_masks::Thresholds;
-use rustc_hash::FxHashSet;
+use crate::frontier_goals::nearest_to_means;
+use crate::frontier_search::FrontierSearch;
+use crate::joined::{BlockParts, Cluster, Joined};
 use serde::Serialize;
 use voxtile::mapper::MapView;
 use voxtile::scan::Stop;
-use voxtile::{Aabb, Point, Result, TileIndex};
+use voxtile::{Aabb, Grid, Point, Result};
 
-/// Options of [`frontiers`].
+/// Options of [`frontiers`] and [`frontiers_in`].
 #[derive(Clone, Debug)]
 #[non_exhaustive]
 #[must_use]
@@ -88,8 +83,12 @@ pub struct Frontier {
     pub area_m2: f64,
     /// Box of the voxels in metres.
     pub bounds_m: Aabb,
-    /// Mean of the centers in metres.
+    /// Mean of the centers in metres. Its place may be occupied or unknown.
     pub center_m: Point,
+    /// Center in metres of its voxel that is nearest to the mean: free space next to the unknown, a goal for a robot.
+    /// `None` unless [`frontiers_in`] has found it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub goal_m: Option<Point>,
 }
 
 /// Finds the frontiers of a map: clusters of free voxels next to unknown ones, where exploration can continue.
@@ -104,76 +103,89 @@ pub fn frontiers<V: MapView>(
     options: &FrontierOptions,
     progress: &(dyn Fn(u64, u64) + Sync),
 ) -> Result<Coverage> {
-    let grid = map.config().grid;
-    let region = options.region.map(|region| grid.voxels_in(&region));
-    let mut blocks = blocks_of(&grid, map.tile_indices().into_iter());
-    if let Some(region) = region {
-        blocks.retain(|&block| {
-            let [min, end] = Cube::of_block(block).positions_of(&region);
-            (0..3).all(|k| min[k] < end[k])
-        });
-    }
+    let search = &mut FrontierSearch::new(map, options);
+    let (mut coverage, clusters) = covered(search, options.min_voxels, progress)?;
+    coverage.frontiers = numbered(&clusters, &map.config().grid);
+    Ok(coverage)
+}
+
+/// Finds the frontiers inside a box in metres, with goals: of any map, also of one that is being built
+/// ([`LiveView`](voxtile::LiveView)).
+///
+/// Frontiers are those of the voxels whose center is inside; `options.region` is ignored. The cost depends on the box,
+/// not on the map.
+///
+/// ```
+/// use voxtile::{Aabb, InMemoryMapper, MapConfig, Mapper, Scan};
+/// use voxtile_compare::{FrontierOptions, frontiers_in};
+///
+/// # fn main() -> voxtile::Result<()> {
+/// let mut map = InMemoryMapper::new(MapConfig::new(0.1, 10.0)?)?;
+/// map.insert_scan(&Scan { origin: [0.05; 3], points: vec![[2.05, 0.05, 0.05]], intensities: None })?;
+/// let around = Aabb { min: [-1.0; 3], max: [1.0; 3] };
+/// let found = frontiers_in(&map, &around, &FrontierOptions::default())?;
+/// assert_eq!(found.len(), 1);
+/// assert!((found[0].area_m2 - 0.41).abs() < 1e-9); // Around a ray of ten voxels, and behind the sensor.
+/// assert!((found[0].goal_m.unwrap()[0] - 0.45).abs() < 1e-9);
+/// # Ok(())
+/// # }
+/// ```
+///
+/// # Errors
+///
+/// As for [`frontiers`].
+pub fn frontiers_in<V: MapView>(map: &V, region: &Aabb, options: &FrontierOptions) -> Result<Vec<Frontier>> {
+    let options = &options.clone().with_region(*region);
+    let search = &mut FrontierSearch::new(map, options);
+    let (_, clusters) = covered(search, options.min_voxels, &|_, _| {})?;
+    let (goals, grid) = (nearest_to_means(search, &clusters)?, &map.config().grid);
+    let with_goal = |(frontier, goal)| Frontier { goal_m: Some(grid.center_m(goal)), ..frontier };
+    Ok(numbered(&clusters, grid).into_iter().zip(goals).map(with_goal).collect())
+}
+
+/// Counts voxels, and returns the clusters to list, the largest first.
+fn covered<V: MapView>(
+    search: &mut FrontierSearch<'_, V>,
+    min_voxels: u64,
+    progress: &(dyn Fn(u64, u64) + Sync),
+) -> Result<(Coverage, Vec<Cluster>)> {
     let mut coverage = Coverage::default();
-    let mut joined = Joined::new(options.min_voxels.max(1));
-    let mut reader = MaskReader::new(map, Thresholds::of(map, f64::INFINITY), options.memory_bytes / 2);
-    let sweep =
-        Sweep { blocks: &blocks, memory_bytes: options.memory_bytes / 2, stop: &options.stop, progress };
-    sweep.run(
-        |blocks| {
-            let cubes = blocks.iter().map(|&block| Cube::of_block(block).grown(1));
-            let tiles: FxHashSet<TileIndex> = cubes.flat_map(|cube| cube.tiles(map)).collect();
-            let mut tiles: Vec<TileIndex> = tiles.into_iter().collect();
-            tiles.sort_unstable();
-            reader.read(&tiles)
-        },
-        |block, loaded| {
-            let own = Cube::of_block(block);
-            let cube = own.grown(1);
-            let bits = BlockBits::of(cube, &cube.tiles(map), loaded);
-            let mut inside = Bits::new(cube);
-            let [min, end] = region.map_or([[0; 3], [own.edge; 3]], |region| own.positions_of(&region));
-            inside.add_box(min.map(|k| k + 1), end.map(|k| k + 1));
-            let of_box = |bits: &Bits| Bits::combined([bits, &inside], |[bits, inside]| bits & inside);
-            let (known, occupied) = (of_box(&bits.known), of_box(&bits.occupied));
-            let free = Bits::combined([&known, &occupied], |[known, occupied]| known & !occupied);
-            // For each direction, the free voxels whose neighbor is unknown.
-            let faces: [Bits; 6] = std::array::from_fn(|k| {
-                let neighbor = bits.known.moved(k / 2, k % 2 == 0);
-                Bits::combined([&free, &neighbor], |[free, neighbor]| free & !neighbor)
-            });
-            let [a, b, c, d, e, f] = &faces;
-            let frontier = Bits::combined([a, b, c, d, e, f], |faces| faces.iter().fold(0, |all, k| all | k));
-            let mut components = Components::of(&frontier);
-            components.count_faces(&faces);
-            Ok((free.count(), occupied.count(), frontier.count(), BlockParts::of(components, block)))
+    let mut joined = Joined::new(min_voxels.max(1));
+    search.for_each_block(
+        &search.blocks(),
+        progress,
+        |block, bits| {
+            let mut components = Components::of(&bits.frontier);
+            components.count_faces(&bits.faces);
+            (bits.free, bits.occupied, bits.frontier.count(), BlockParts::of(components, block))
         },
         |block, (free, occupied, frontier, parts)| {
             coverage.free += free;
             coverage.occupied += occupied;
             coverage.frontier_voxels += frontier;
             parts.join(block, &mut joined);
-            Ok(())
         },
     )?;
     let (clusters, [small_frontiers, _]) = joined.finish();
     coverage.small_frontiers = small_frontiers;
-    coverage.frontiers = clusters
-        .iter()
-        .zip(1..)
-        .map(|(cluster, number)| Frontier {
-            number,
-            voxels: cluster.sums.voxels,
-            area_m2: cluster.sums.faces as f64 * grid.resolution_m().powi(2),
-            bounds_m: bounds_m(&cluster.sums, &grid),
-            center_m: center_m(&cluster.sums, &grid),
-        })
-        .collect();
-    if let Some(region) = region {
+    if let Some(region) = search.region() {
         let edge = |k: usize| (i64::from(region.end[k]) - i64::from(region.min[k])).max(0) as u64;
         let all = edge(0).saturating_mul(edge(1)).saturating_mul(edge(2));
         coverage.voxels_of_box = Some(all);
         let observed = (coverage.free + coverage.occupied) as f64;
         coverage.observed_share = Some(if all == 0 { 0.0 } else { observed / all as f64 });
     }
-    Ok(coverage)
+    Ok((coverage, clusters))
+}
+
+fn numbered(clusters: &[Cluster], grid: &Grid) -> Vec<Frontier> {
+    let frontier = |(cluster, number): (&Cluster, u32)| Frontier {
+        number,
+        voxels: cluster.sums.voxels,
+        area_m2: cluster.sums.faces as f64 * grid.resolution_m().powi(2),
+        bounds_m: bounds_m(&cluster.sums, grid),
+        center_m: center_m(&cluster.sums, grid),
+        goal_m: None,
+    };
+    clusters.iter().zip(1..).map(frontier).collect()
 }

@@ -11,7 +11,9 @@
 //!     -> joined                                   the same across blocks
 //! compare -> Comparison                           counts, and the list of changes
 //! for_each_voxel                                  the voxels with their classes, in a second pass
-//! frontiers                                       free voxels next to unknown ones, of one map
+//! frontiers -> frontier_search                    free voxels next to unknown ones, of one map
+//!     -> components -> joined                     the same, clustered
+//!     -> frontier_goals                           a free voxel of each cluster for a robot, in a second pass
 //! tops -> volumes                                 highest voxels of columns, and what is between two surfaces
 //! ```
 //!
@@ -25,6 +27,8 @@ mod change;
 mod classify;
 mod compare;
 mod components;
+mod frontier_goals;
+mod frontier_search;
 mod frontiers;
 mod joined;
 mod mask_reader;
@@ -40,7 +44,7 @@ mod voxel_class;
 
 pub use change::{Change, ChangeKind, Clusters, Comparison, EpochCounts};
 pub use compare::compare;
-pub use frontiers::{Coverage, Frontier, FrontierOptions, frontiers};
+pub use frontiers::{Coverage, Frontier, FrontierOptions, frontiers, frontiers_in};
 pub use options::{CompareOptions, MAX_TOLERANCE_VOXELS};
 pub use visit::{ComparedVoxel, for_each_voxel};
 pub use volume_options::VolumeOptions;

@@ -3,6 +3,7 @@
 mod epochs;
 mod exact;
 mod frontiers;
+mod frontiers_in;
 mod naive;
 mod random_maps;
 mod refused;
