@@ -5,6 +5,8 @@
 //! questions      queries of arrays of points, rays and boxes
 //! local_map      LocalMap: obstacles around the robot
 //! distance       distances to the nearest obstacle
+//! compare        changes between two maps
+//! frontiers      where exploration can continue
 //! operations     whole maps on disk
 //! remapping      replays of kept scans: new poses, other parameters, removals
 //! scan_iterator  files of scans
@@ -20,9 +22,11 @@
 mod arrays;
 mod calls;
 mod command;
+mod compare;
 mod config;
 mod distance;
 mod errors;
+mod frontiers;
 mod keywords;
 mod layers;
 mod local_map;
@@ -47,7 +51,11 @@ mod _voxtile {
     #[pymodule_export]
     use super::command::run_command;
     #[pymodule_export]
+    use super::compare::{Change, Comparison, compare};
+    #[pymodule_export]
     use super::distance::{DistanceField, compute_distances};
+    #[pymodule_export]
+    use super::frontiers::Frontier;
     #[pymodule_export]
     use super::layers::class_style;
     #[pymodule_export]

@@ -4,7 +4,9 @@ use crate::arrays::{PointSlice, Points, column, doubles, object, rows};
 use crate::config::{ConfigArguments, bytes_of, config_of};
 use crate::distance::{DistanceField, options_of};
 use crate::errors::{exception, exception_of_kind, wrong};
+use crate::frontiers::{self, Frontier};
 use crate::layers;
+use crate::operations::named_snapshot;
 use crate::questions::{self, bodies_of};
 use crate::report::InsertReport;
 use crate::scan::GivenScan;
@@ -78,8 +80,13 @@ impl Map {
         })
     }
 
-    fn source(&self, py: Python<'_>) -> PyResult<Arc<Source>> {
+    pub fn source(&self, py: Python<'_>) -> PyResult<Arc<Source>> {
         self.source.read().clone().ok_or_else(|| closed(py, &self.path))
+    }
+
+    /// Name of the map in messages.
+    pub fn name(&self) -> PathBuf {
+        self.snapshot.as_ref().map_or_else(|| self.path.clone(), |name| named_snapshot(&self.path, name))
     }
 
     /// Returns the map, if it is open for writing.
@@ -642,6 +649,26 @@ impl Map {
         let source = self.source(py)?;
         let field = finished(py, move |stop| source.ask(stop, |map| map.distance_field(&region, options)))?;
         Ok(DistanceField::new(field))
+    }
+
+    /// Frontiers: clusters of free voxels that share faces with unknown ones, where exploration can continue; the largest
+    /// first.
+    ///
+    /// `region` is a box, lower and upper corner in metres: only voxels inside count, and the cost depends on the box,
+    /// not on the map. Frontiers with less area than `min_area` in square metres, or fewer voxels than `min_voxels`, are
+    /// left out.
+    #[pyo3(signature = (region=None, *, min_area=0.0, min_voxels=8))]
+    fn frontiers(
+        &self,
+        py: Python<'_>,
+        region: Option<&Bound<'_, PyAny>>,
+        min_area: f64,
+        min_voxels: u64,
+    ) -> PyResult<Vec<Frontier>> {
+        let region = region.map(region_of).transpose()?;
+        self.ask(py, usize::MAX, |source, stop| {
+            source.ask(stop, |map| frontiers::found(map, region.as_ref(), min_area, min_voxels, stop))
+        })
     }
 
     /// What the layers store of the points that hit the voxels at points: a dictionary of arrays. `points` is there in

@@ -25,6 +25,14 @@ pub enum MapOrSnapshot {
 }
 
 impl MapOrSnapshot {
+    /// Name of the map in messages.
+    pub fn name(&self) -> PathBuf {
+        match self {
+            Self::Map(path) => path.clone(),
+            Self::Snapshot(path, name) => named_snapshot(path, name),
+        }
+    }
+
     pub fn open(&self) -> Result<MapReader> {
         match self {
             Self::Map(path) => MapReader::open(folder_of(path)?, MemoryLimit::DEFAULT_BYTES),
@@ -35,6 +43,11 @@ impl MapOrSnapshot {
             ),
         }
     }
+}
+
+/// Name of a snapshot, as the command takes it.
+pub fn named_snapshot(map: &Path, name: &str) -> PathBuf {
+    PathBuf::from(format!("{}@{name}", map.display()))
 }
 
 /// Returns the folder of a map, or an error for a file.

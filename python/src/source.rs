@@ -1,11 +1,13 @@
 //! Open maps that can be queried: one open for writing, one open for reading, a file of OctoMap.
 
+use crate::operations::MapOrSnapshot;
 use parking_lot::{Mutex, MutexGuard, RwLock};
 use std::path::Path;
 use std::time::Duration;
 use voxtile::mapper::{LiveReader, MapReader, MapView, Mapper, OctreeMap, Stoppable};
+use voxtile::store::Extension;
 use voxtile::{Error, MapConfig, OutOfCoreTileMapper, Result, Stop};
-use voxtile_pipeline::octree_file;
+use voxtile_pipeline::{MapAt, octree_file};
 
 /// View of a map whose queries end with an error at the next tile after its stop is set.
 pub type View<'a> = Stoppable<'a, dyn MapView + 'a>;
@@ -25,6 +27,16 @@ pub enum Source {
     Octree(Box<OctreeMap>),
 }
 
+/// State of an open map. Equal states of one map have equal content.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct State {
+    scan_number: u64,
+    /// 0 except for maps open for reading.
+    flush_number: u64,
+}
+
+/// Memory to read the metadata of a map.
+const LEAST_BYTES: usize = 1 << 20;
 /// Attempts at a query whose view expires because the map changed too much meanwhile.
 const ATTEMPTS: usize = 8;
 /// Interval of checks for a stop while another thread holds the mapper.
@@ -42,6 +54,25 @@ impl Source {
         OctreeMap::of(octree_file::read(path)?).map(|map| Self::Octree(Box::new(map)))
     }
 
+    /// Opens a map, a snapshot, or a file of OctoMap.
+    pub fn at(place: &MapOrSnapshot) -> Result<Self> {
+        let reader = match place {
+            MapOrSnapshot::Map(path) if OctreeMap::is_named_by(path) => return Self::octree(path),
+            MapOrSnapshot::Map(path) => MapAt::of(path)?.open()?,
+            MapOrSnapshot::Snapshot(..) => place.open()?,
+        };
+        Ok(Self::Reader(Box::new(RwLock::new(reader))))
+    }
+
+    /// Returns the id and the inputs of the map at `path` at its last flush, if they are known.
+    pub fn extension(&self, path: &Path) -> Option<Extension> {
+        match self {
+            Self::Reader(reader) => reader.read().metadata().ext.clone(),
+            Self::Octree(_) => None,
+            Self::Writer { .. } => MapReader::open(path, LEAST_BYTES).ok()?.metadata().ext.clone(),
+        }
+    }
+
     /// Returns the configuration of the map.
     pub fn config(&self) -> MapConfig {
         match self {
@@ -53,20 +84,42 @@ impl Source {
 
     /// Queries the map as it is after its latest scan.
     pub fn ask<T>(&self, stop: &Stop, mut question: impl FnMut(&View<'_>) -> Result<T>) -> Result<T> {
-        let mut ask = |view: &dyn MapView| question(&Stoppable::new(view, stop));
+        again_if_expired(|| match self {
+            Self::Reader(reader) => question(&Stoppable::new(&*reader.read(), stop)),
+            other => other.ask_once(stop, &mut |view, _| question(view)),
+        })
+    }
+
+    /// Queries two maps together, which may be the same, with their states.
+    pub fn ask_both<T>(
+        sources: [&Self; 2],
+        stop: &Stop,
+        mut question: impl FnMut([&View<'_>; 2], [State; 2]) -> Result<T>,
+    ) -> Result<T> {
+        let [first, second] = sources;
+        again_if_expired(|| {
+            first.ask_once(stop, &mut |of_first, state| match std::ptr::eq(first, second) {
+                true => question([of_first, of_first], [state; 2]),
+                false => second
+                    .ask_once(stop, &mut |of_second, other| question([of_first, of_second], [state, other])),
+            })
+        })
+    }
+
+    /// Queries the map. The query may hold other maps.
+    fn ask_once<T>(&self, stop: &Stop, question: &mut dyn FnMut(&View<'_>, State) -> Result<T>) -> Result<T> {
+        let mut ask = |view: &dyn MapView, flush_number| {
+            let state = State { scan_number: view.scan_number(), flush_number };
+            question(&Stoppable::new(view, stop), state)
+        };
         match self {
-            Self::Reader(reader) => ask(&*reader.read()),
-            Self::Octree(map) => ask(&**map),
-            Self::Writer { reader, .. } => {
-                let mut answer = Err(Error::Expired);
-                for _ in 0..ATTEMPTS {
-                    answer = ask(&reader.view());
-                    if !matches!(answer, Err(Error::Expired)) {
-                        break;
-                    }
-                }
-                answer
+            Self::Reader(reader) => {
+                // Two queries with two maps each would wait for each other if a waiting refresh blocked them.
+                let reader = reader.read_recursive();
+                ask(&*reader, reader.flush_number())
             }
+            Self::Octree(map) => ask(&**map, 0),
+            Self::Writer { reader, .. } => ask(&reader.view(), 0),
         }
     }
 
@@ -125,6 +178,16 @@ impl Source {
         drop(guard.take());
         Ok(())
     }
+}
+
+fn again_if_expired<T>(mut attempt: impl FnMut() -> Result<T>) -> Result<T> {
+    for _ in 1..ATTEMPTS {
+        match attempt() {
+            Err(Error::Expired) => {}
+            answer => return answer,
+        }
+    }
+    attempt()
 }
 
 fn changed<T>(

@@ -12,7 +12,10 @@ import atexit
 
 from . import errors
 from ._voxtile import (
+    Change,
+    Comparison,
     DistanceField,
+    Frontier,
     InsertReport,
     LocalMap,
     Map,
@@ -20,6 +23,7 @@ from ._voxtile import (
     TileIterator,
     clean,
     clear,
+    compare,
     compute_distances,
     convert,
     crop,
@@ -47,7 +51,10 @@ atexit.register(wait_for_all)
 del wait_for_all
 
 __all__ = [
+    "Change",
+    "Comparison",
     "DistanceField",
+    "Frontier",
     "InsertReport",
     "LocalMap",
     "Map",
@@ -57,6 +64,7 @@ __all__ = [
     "build",
     "clean",
     "clear",
+    "compare",
     "compute_distances",
     "convert",
     "crop",

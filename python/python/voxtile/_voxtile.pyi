@@ -3,13 +3,16 @@ from os import PathLike
 from pathlib import Path
 from subprocess import Popen
 from types import TracebackType
-from typing import Any, Literal, NoReturn, TypeAlias, final
+from typing import Any, ClassVar, Literal, NoReturn, TypeAlias, final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 __all__ = [
+    "Change",
+    "Comparison",
     "DistanceField",
+    "Frontier",
     "InsertReport",
     "LocalMap",
     "Map",
@@ -22,6 +25,7 @@ __all__ = [
     "class_style",
     "clean",
     "clear",
+    "compare",
     "compute_distances",
     "convert",
     "count_scans",
@@ -141,6 +145,60 @@ class DistanceField:
     ) -> tuple[NDArray[Any], NDArray[np.float64]]: ...
 
 @final
+class Change:
+    @property
+    def number(self) -> int: ...
+    @property
+    def kind(self) -> Literal["vanished", "appeared"]: ...
+    @property
+    def voxels(self) -> int: ...
+    @property
+    def volume_m3(self) -> float: ...
+    @property
+    def bounds(self) -> NDArray[np.float64]: ...
+    @property
+    def center(self) -> NDArray[np.float64]: ...
+    @property
+    def colour(self) -> tuple[int, int, int] | None: ...
+    @property
+    def class_(self) -> int | None: ...
+    @property
+    def first_ns(self) -> int | None: ...
+    @property
+    def last_ns(self) -> int | None: ...
+
+@final
+class Comparison:
+    CLASSES: ClassVar[dict[str, int]]
+    @property
+    def counts(self) -> dict[str, dict[str, float]]: ...
+    @property
+    def changes(self) -> list[Change]: ...
+    @property
+    def warnings(self) -> list[str]: ...
+    @property
+    def resolution(self) -> float: ...
+    def voxels(self, change: int | None = None) -> tuple[NDArray[np.float64], NDArray[np.uint8]]: ...
+    def to_dict(self) -> dict[str, Any]: ...
+    def to_geojson(self) -> dict[str, Any]: ...
+    def _repr_html_(self) -> str: ...
+
+@final
+class Frontier:
+    @property
+    def number(self) -> int: ...
+    @property
+    def voxels(self) -> int: ...
+    @property
+    def area_m2(self) -> float: ...
+    @property
+    def bounds(self) -> NDArray[np.float64]: ...
+    @property
+    def center(self) -> NDArray[np.float64]: ...
+    @property
+    def goal(self) -> NDArray[np.float64]: ...
+
+@final
 class Map:
     @staticmethod
     def create(
@@ -246,6 +304,9 @@ class Map:
         unknown: _UnknownRule = "unknown",
         signed: bool = False,
     ) -> DistanceField: ...
+    def frontiers(
+        self, region: ArrayLike | None = None, *, min_area: float = 0.0, min_voxels: int = 8
+    ) -> list[Frontier]: ...
     def digest(self) -> str: ...
     def plot(self, **options: Any) -> Any: ...
     def view(self) -> Popen[bytes]: ...
@@ -312,6 +373,17 @@ def clean(
     memory: int | str | None = None,
     progress: _Progress | None = None,
 ) -> dict[str, Any]: ...
+def compare(
+    before: Map | _MapOrSnapshot,
+    after: Map | _MapOrSnapshot,
+    *,
+    tolerance: float | None = None,
+    certainty: float = 0.7,
+    min_voxels: int = 8,
+    region: ArrayLike | None = None,
+    memory: int | str | None = None,
+    progress: _Progress | None = None,
+) -> Comparison: ...
 def compute_distances(
     map: _MapOrSnapshot,
     folder: _Path,

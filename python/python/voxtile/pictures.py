@@ -14,13 +14,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ._voxtile import Map, class_style
+from ._voxtile import Comparison, Map, class_style
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 _MOST_PIXELS = 2048
+# Changes in the table of a notebook.
+_MOST_CHANGES = 10
 # Layers by the names of colors, as in `voxtile picture --color`.
 _LAYERS = {"rgb": "colour", "intensity": "intensity", "class": "class", "age": "time"}
 _NO_VALUE = (92, 98, 108)
@@ -195,6 +197,33 @@ def summary_html(map: Map) -> str:
     }
     rows = "".join(f"<tr><th>{name}</th><td>{value}</td></tr>" for name, value in cells.items())
     return f"<p><b>voxtile map</b></p><table>{rows}</table>{_picture_html(map)}"
+
+
+def comparison_html(comparison: Comparison) -> str:
+    """Returns the tables of a comparison that notebooks show: the counts, and the largest changes."""
+    counts = [
+        [name.replace("_", " "), str(count["voxels"]), f"{count['volume_m3']:.3g}"]
+        for name, count in comparison.counts.items()
+    ]
+    changes = []
+    for change in comparison.changes[:_MOST_CHANGES]:
+        center, size = change.center, change.bounds[1] - change.bounds[0]
+        place = " ".join(f"{k:.2f}" for k in center)
+        edges = " x ".join(f"{k:.2f}" for k in size)
+        changes.append([str(change.number), change.kind, str(change.voxels), place, edges])
+    tables = _table_html(["class", "voxels", "m3"], counts)
+    tables += _table_html(["change", "kind", "voxels", "center in m", "size in m"], changes)
+    rest = len(comparison.changes) - len(changes)
+    remarks = ([f"and {rest} more changes"] if rest else []) + comparison.warnings
+    return f"<p><b>voxtile comparison</b></p>{tables}" + "".join(f"<p>{html.escape(line)}</p>" for line in remarks)
+
+
+def _table_html(head: list[str], rows: list[list[str]]) -> str:
+    if not rows:
+        return ""
+    cells = "".join(f"<th>{name}</th>" for name in head)
+    lines = ("".join(f"<td>{value}</td>" for value in row) for row in rows)
+    return f"<table><tr>{cells}</tr>{''.join(f'<tr>{line}</tr>' for line in lines)}</table>"
 
 
 def _picture_html(map: Map) -> str:

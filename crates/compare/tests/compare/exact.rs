@@ -67,6 +67,10 @@ fn check<A: MapView, B: MapView>(a: &A, b: &B, options: &CompareOptions, name: &
         of_before.iter().filter(|(_, class)| **class != VoxelClass::Unchanged).map(|(k, v)| (*k, *v)),
     );
     assert_eq!(found, wanted, "{name}");
+    for class in VoxelClass::ALL {
+        let count = found.values().filter(|other| **other == class).count() as u64;
+        assert_eq!(comparison.voxels_of(class), count, "{name}: {class:?}");
+    }
     let mut all = Vec::new();
     for (kind, class, of_kind, counted) in [
         (ChangeKind::Vanished, VoxelClass::Vanished, &of_before, comparison.vanished),

@@ -48,7 +48,7 @@ pub fn write_change_list(comparison: &Comparison, crs: Option<&str>, output: &Pa
     let written = match format {
         ListFormat::Csv => write_csv(&comparison.changes, file.out()),
         ListFormat::Json => write_json(&serde_json::to_value(comparison)?, file.out()),
-        ListFormat::GeoJson => write_json(&geojson(&comparison.changes, crs), file.out()),
+        ListFormat::GeoJson => write_json(&change_features(&comparison.changes, crs), file.out()),
     };
     file.written(written)?;
     file.finish()
@@ -83,9 +83,9 @@ fn write_json(value: &Value, out: &mut impl Write) -> io::Result<()> {
     writeln!(out)
 }
 
-/// Returns the features. Coordinates are those of the map, whose system is named as in GeoJSON before RFC 7946, which
-/// GDAL and QGIS read.
-fn geojson(changes: &[Change], crs: Option<&str>) -> Value {
+/// Returns the changes as GeoJSON. Coordinates are those of the map, whose system is named as in GeoJSON before RFC 7946,
+/// which GDAL and QGIS read.
+pub fn change_features(changes: &[Change], crs: Option<&str>) -> Value {
     let feature = |change: &Change| {
         let ([x0, y0, z0], [x1, y1, z1]) = (change.bounds_m.min, change.bounds_m.max);
         json!({

@@ -3,13 +3,15 @@
 //! ```text
 //! Comparison -> write_change_list: a row per change      list
 //!            -> write_changed_voxels: a row per voxel    voxels
-//! two maps -> warnings_of: doubts about the result       warnings
+//! ComparedMap -> warnings_of: doubts about the result    warnings
 //! ```
 
+mod compared_map;
 mod list;
 mod voxels;
 mod warnings;
 
-pub use list::{ListFormat, write_change_list};
+pub use compared_map::ComparedMap;
+pub use list::{ListFormat, change_features, write_change_list};
 pub use voxels::{WhichChanges, changes_format, class_code, write_changed_voxels};
 pub use warnings::{check_crs, common_voxels, warnings_of};

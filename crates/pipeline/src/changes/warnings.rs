@@ -1,6 +1,6 @@
+use super::ComparedMap;
 use crate::map_at::AnyMap;
 use std::path::Path;
-use voxtile::mapper::MapView;
 use voxtile::space::VoxelBox;
 use voxtile::store::{Extension, InputRecord};
 use voxtile::{Clearing, Error, Result, beginning_or_difference};
@@ -10,12 +10,13 @@ use voxtile::{Clearing, Error, Result, beginning_or_difference};
 /// # Errors
 ///
 /// The systems differ.
-pub fn check_crs(maps: [(&Path, &AnyMap); 2]) -> Result<Option<String>> {
-    let [before, after] = maps.map(|(_, map)| map.config().crs.clone());
+pub fn check_crs<'a>(maps: [impl Into<ComparedMap<'a>>; 2]) -> Result<Option<String>> {
+    let maps: [ComparedMap<'a>; 2] = maps.map(Into::into);
+    let [before, after] = maps.map(|map| map.config.crs.clone());
     if let (Some(wanted), Some(found)) = (&before, &after)
         && wanted != found
     {
-        let (path, what) = (maps[1].0.to_owned(), "the coordinate reference system");
+        let (path, what) = (maps[1].path.to_owned(), "the coordinate reference system");
         let (found, wanted) =
             (beginning_or_difference(found, wanted), beginning_or_difference(wanted, found));
         return Err(Error::Mismatch { path, what, found, wanted });
@@ -24,37 +25,38 @@ pub fn check_crs(maps: [(&Path, &AnyMap); 2]) -> Result<Option<String>> {
 }
 
 /// Returns what makes the changes between two maps doubtful, the gravest first.
-pub fn warnings_of(maps: [(&Path, &AnyMap); 2]) -> Vec<String> {
+pub fn warnings_of<'a>(maps: [impl Into<ComparedMap<'a>>; 2]) -> Vec<String> {
     let mut warnings = Vec::new();
-    let [(before_path, before), (after_path, after)] = maps;
-    if common_voxels(before, after).is_none() {
-        let [before, after] = [before_path, after_path].map(Path::display);
+    let maps: [ComparedMap<'a>; 2] = maps.map(Into::into);
+    let [before, after] = maps;
+    if common(before, after).is_none() {
+        let [before, after] = [before.path, after.path].map(Path::display);
         warnings.push(format!(
             "{before} and {after} have no place in common: all voxels are not seen in the other map; check that both \
              have the same frame"
         ));
     }
-    if let [Some(before), Some(after)] = [extension_of(before), extension_of(after)] {
-        if before.map_id == after.map_id {
+    if let [Some(of_before), Some(of_after)] = [before.extension, after.extension] {
+        if of_before.map_id == of_after.map_id {
             warnings.push(format!(
                 "both are states of one map, so the later one contains the evidence of {}: a change appears only when \
                  later scans outweigh it",
-                before_path.display()
+                before.path.display()
             ));
-        } else if let Some(name) = common_input(before, after) {
+        } else if let Some(name) = common_input(of_before, of_after) {
             warnings.push(format!("both maps contain scans of {name}, so their evidence is not independent"));
         }
     }
-    for (path, map) in maps {
-        if map.config().rays.clearing() == Clearing::Octomap {
+    for map in maps {
+        if map.config.rays.clearing() == Clearing::Octomap {
             warnings.push(format!(
                 "{} was made with OctoMap's rule of clearing, by which passing rays erase surfaces: these look vanished; \
                  build it with `--clearing guarded`",
-                path.display()
+                map.path.display()
             ));
         }
     }
-    if before.config().crs.is_some() != after.config().crs.is_some() {
+    if before.config.crs.is_some() != after.config.crs.is_some() {
         warnings.push(
             "only one of the maps names a coordinate reference system; the other is taken to have it too"
                 .into(),
@@ -63,16 +65,14 @@ pub fn warnings_of(maps: [(&Path, &AnyMap); 2]) -> Vec<String> {
     warnings
 }
 
-fn extension_of(map: &AnyMap) -> Option<&Extension> {
-    match map {
-        AnyMap::Map(reader) => reader.metadata().ext.as_ref(),
-        AnyMap::Octree(_) => None,
-    }
-}
-
 /// Returns the common part of the boxes around the tiles of two maps of one resolution; `None` if it is empty.
 pub fn common_voxels(before: &AnyMap, after: &AnyMap) -> Option<VoxelBox> {
-    let voxels = |map: &AnyMap| Some(map.config().grid.voxels_of_tiles(map.tile_bounds()?));
+    let unnamed = Path::new("");
+    common((unnamed, before).into(), (unnamed, after).into())
+}
+
+fn common(before: ComparedMap<'_>, after: ComparedMap<'_>) -> Option<VoxelBox> {
+    let voxels = |map: ComparedMap<'_>| Some(map.config.grid.voxels_of_tiles(map.tile_bounds?));
     let common = voxels(before)?.intersection(&voxels(after)?);
     (!common.is_empty()).then_some(common)
 }

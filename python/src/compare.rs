@@ -1,0 +1,334 @@
+//! `voxtile.compare`: changes between two maps.
+
+use crate::arrays::{column, object, rows};
+use crate::config::bytes_of;
+use crate::errors::{exception_of_kind, wrong};
+use crate::map::{Map, region_of};
+use crate::operations::{Callback, MapOrSnapshot};
+use crate::source::{Source, State};
+use crate::watched::{Progress, watched, watched_with_progress};
+use numpy::{PyArray1, PyArray2};
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use std::path::PathBuf;
+use std::sync::Arc;
+use voxtile::mapper::MapView;
+use voxtile::store::Extension;
+use voxtile::{Aabb, Grid, Result, Stop};
+use voxtile_compare::{CompareOptions, VoxelClass, for_each_voxel};
+use voxtile_pipeline::{ComparedMap, change_features, check_crs, class_code, warnings_of};
+
+/// Memory for tiles.
+const DEFAULT_BYTES: usize = 256 << 20;
+
+type Voxels<'py> = (Bound<'py, PyArray2<f64>>, Bound<'py, PyArray1<u8>>);
+
+/// An open map, or a place of one.
+#[derive(FromPyObject)]
+pub enum MapToCompare<'py> {
+    /// An open map, with the scans that are not yet flushed.
+    Open(Bound<'py, Map>),
+    /// A place, perhaps of a file of OctoMap.
+    At(MapOrSnapshot),
+}
+
+/// One of two compared maps.
+struct Side {
+    name: PathBuf,
+    source: Arc<Source>,
+    extension: Option<Extension>,
+}
+
+/// A side before it is opened.
+enum Place {
+    Open(Arc<Source>, PathBuf),
+    At(MapOrSnapshot),
+}
+
+impl Place {
+    fn of(py: Python<'_>, map: MapToCompare<'_>) -> PyResult<Self> {
+        Ok(match map {
+            MapToCompare::Open(map) => Self::Open(map.get().source(py)?, map.get().name()),
+            MapToCompare::At(place) => Self::At(place),
+        })
+    }
+
+    fn open(&self) -> Result<Side> {
+        let (name, source) = match self {
+            Self::Open(source, name) => (name.clone(), source.clone()),
+            Self::At(place) => (place.name(), Arc::new(Source::at(place)?)),
+        };
+        let extension = source.extension(&name);
+        Ok(Side { name, source, extension })
+    }
+}
+
+/// Compares two maps: finds which occupied voxels of each are unchanged, changed, or not seen in the other one.
+///
+/// A map is an open `Map`, a path (also `"map@snapshot"`, and a file of OctoMap), or a tuple of a path and the name of
+/// a snapshot. Both need the same resolution. `tolerance` in metres is the distance along each axis within which
+/// occupied voxels are the same surface (default: one voxel). A voxel has changed if one map knows it as occupied and
+/// the other as free, each with at least the probability `certainty`. Clusters of fewer than `min_voxels` voxels are
+/// counted, not listed. `region` is a box, lower and upper corner in metres. `memory` is for tiles.
+#[pyfunction]
+#[pyo3(signature = (before, after, *, tolerance=None, certainty=0.7, min_voxels=8, region=None, memory=None,
+    progress=None))]
+#[expect(clippy::too_many_arguments, reason = "keywords, in Python")]
+pub fn compare(
+    py: Python<'_>,
+    before: MapToCompare<'_>,
+    after: MapToCompare<'_>,
+    tolerance: Option<f64>,
+    certainty: f64,
+    min_voxels: u64,
+    region: Option<Bound<'_, PyAny>>,
+    memory: Option<Bound<'_, PyAny>>,
+    progress: Callback,
+) -> PyResult<Comparison> {
+    let options = CompareOptions::default()
+        .with_tolerance(tolerance)
+        .with_certainty(certainty)
+        .with_min_voxels(min_voxels)
+        .with_region(region.as_ref().map(region_of).transpose()?)
+        .with_memory(memory.as_ref().map(bytes_of).transpose()?.unwrap_or(DEFAULT_BYTES));
+    let places = [Place::of(py, before)?, Place::of(py, after)?];
+    watched_with_progress(py, progress, |stop, progress| {
+        let sides = [places[0].open()?, places[1].open()?];
+        Comparison::of(sides, options.with_stop(stop.clone()), progress)
+    })
+}
+
+/// Changes between two maps, returned by `voxtile.compare`.
+///
+/// Keeps maps that were given as paths open, as they were compared.
+#[pyclass(frozen, module = "voxtile")]
+pub struct Comparison {
+    found: voxtile_compare::Comparison,
+    options: CompareOptions,
+    sides: [Side; 2],
+    states: [State; 2],
+    grid: Grid,
+    crs: Option<String>,
+    warnings: Vec<String>,
+}
+
+impl Comparison {
+    fn of(sides: [Side; 2], options: CompareOptions, progress: &Progress<'_>) -> Result<Self> {
+        let stop = options.stop.clone();
+        let sources = [&*sides[0].source, &*sides[1].source];
+        let (found, states, grid, crs, warnings) =
+            Source::ask_both(sources, &stop, |[before, after], states| {
+                let maps = [(&sides[0], before), (&sides[1], after)].map(|(side, map)| ComparedMap {
+                    path: &side.name,
+                    config: map.config(),
+                    tile_bounds: map.tile_bounds(),
+                    extension: side.extension.as_ref(),
+                });
+                let crs = check_crs(maps)?;
+                let report = |done, all| progress.report(done, all);
+                let found = voxtile_compare::compare(before, after, &options, &report)?;
+                Ok((found, states, before.config().grid, crs, warnings_of(maps)))
+            })?;
+        Ok(Self { found, options, sides, states, grid, crs, warnings })
+    }
+
+    /// Returns the centers and classes of voxels; those of one change, or all. `None` if a map has changed.
+    fn collect(&self, change: Option<u32>, stop: &Stop) -> Result<Option<(Vec<[f64; 3]>, Vec<u8>)>> {
+        let options = self.options.clone().with_stop(stop.clone());
+        let classes: &[VoxelClass] = match change {
+            Some(_) => &[VoxelClass::Vanished, VoxelClass::Appeared],
+            None => &VoxelClass::ALL,
+        };
+        let sources = [&*self.sides[0].source, &*self.sides[1].source];
+        Source::ask_both(sources, stop, |[before, after], states| {
+            if states != self.states {
+                return Ok(None);
+            }
+            let (mut centers_m, mut codes) = (Vec::new(), Vec::new());
+            for_each_voxel(
+                before,
+                after,
+                &options,
+                &self.found,
+                classes,
+                |voxel| {
+                    if change.is_none() || voxel.change == change {
+                        centers_m.push(self.grid.center_m(voxel.index));
+                        codes.push(class_code(voxel.class));
+                    }
+                    Ok(())
+                },
+                &|_, _| {},
+            )?;
+            Ok(Some((centers_m, codes)))
+        })
+    }
+}
+
+#[pymethods]
+impl Comparison {
+    /// Codes of the classes in arrays and files, by name.
+    #[classattr]
+    #[pyo3(name = "CLASSES")]
+    fn classes(py: Python<'_>) -> PyResult<Bound<'_, PyDict>> {
+        let codes = PyDict::new(py);
+        for class in VoxelClass::ALL {
+            codes.set_item(class.name(), class_code(class))?;
+        }
+        Ok(codes)
+    }
+
+    /// Voxels of each class, by its name: a dict of "voxels", their number, and "volume_m3" in cubic metres. Unchanged
+    /// voxels are those of the later map.
+    #[getter]
+    fn counts<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let counts = PyDict::new(py);
+        for class in VoxelClass::ALL {
+            let (of_class, voxels) = (PyDict::new(py), self.found.voxels_of(class));
+            of_class.set_item("voxels", voxels)?;
+            of_class.set_item("volume_m3", voxels as f64 * self.grid.resolution_m().powi(3))?;
+            counts.set_item(class.name(), of_class)?;
+        }
+        Ok(counts)
+    }
+
+    /// The listed changes, the largest first.
+    #[getter]
+    fn changes(&self) -> Vec<Change> {
+        self.found.changes.iter().cloned().map(Change).collect()
+    }
+
+    /// Reasons to doubt the result, the gravest first.
+    #[getter]
+    fn warnings(&self) -> Vec<String> {
+        self.warnings.clone()
+    }
+
+    /// Edge of a voxel in metres.
+    #[getter]
+    fn resolution(&self) -> f64 {
+        self.grid.resolution_m()
+    }
+
+    /// Centers in metres (`float64`, N x 3) and classes (`uint8`, see `CLASSES`) of the occupied voxels of both maps, or
+    /// of the change with a number. Reads the maps again; an open map must not have changed since.
+    #[pyo3(signature = (change=None))]
+    fn voxels<'py>(&self, py: Python<'py>, change: Option<u32>) -> PyResult<Voxels<'py>> {
+        if let Some(number) = change
+            && !self.found.changes.iter().any(|change| change.number == number)
+        {
+            let reason =
+                format!("{number} is not the number of one of the {} changes", self.found.changes.len());
+            return Err(wrong(py, "change", reason));
+        }
+        let Some((centers_m, codes)) = watched(py, |stop| self.collect(change, stop))? else {
+            let message = "a map has changed since the comparison; compare the maps again";
+            return Err(exception_of_kind(py, "changed", message));
+        };
+        Ok((rows(py, centers_m)?, column(py, codes)))
+    }
+
+    /// The result as a dict, as `voxtile compare --json` prints it.
+    fn to_dict<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let found = object(py, &self.found)?;
+        found.set_item("resolution_m", self.grid.resolution_m())?;
+        found.set_item("crs", self.crs.as_deref())?;
+        found.set_item("warnings", &self.warnings)?;
+        Ok(found)
+    }
+
+    /// The listed changes as GeoJSON, as a dict: a feature for each, with the rectangle around it in the coordinates of
+    /// the maps, in metres.
+    fn to_geojson<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        object(py, &change_features(&self.found.changes, self.crs.as_deref()))
+    }
+
+    fn _repr_html_(slf: &Bound<'_, Self>) -> PyResult<String> {
+        slf.py().import("voxtile.pictures")?.call_method1("comparison_html", (slf,))?.extract()
+    }
+
+    fn __repr__(&self) -> String {
+        let [vanished, appeared] =
+            [VoxelClass::Vanished, VoxelClass::Appeared].map(|k| self.found.voxels_of(k));
+        let changes = self.found.changes.len();
+        format!("<voxtile.Comparison: {changes} changes; {vanished} voxels vanished, {appeared} appeared>")
+    }
+}
+
+/// Cluster of voxels that vanished or appeared.
+#[pyclass(frozen, module = "voxtile")]
+pub struct Change(voxtile_compare::Change);
+
+#[pymethods]
+impl Change {
+    /// Number, from 1 on: by the number of voxels, then by the lowest voxel.
+    #[getter]
+    fn number(&self) -> u32 {
+        self.0.number
+    }
+
+    /// "vanished" or "appeared".
+    #[getter]
+    fn kind(&self) -> &'static str {
+        self.0.kind.name()
+    }
+
+    /// Number of voxels.
+    #[getter]
+    fn voxels(&self) -> u64 {
+        self.0.voxels
+    }
+
+    /// Volume of the voxels in cubic metres: of the surface that was seen.
+    #[getter]
+    fn volume_m3(&self) -> f64 {
+        self.0.volume_m3
+    }
+
+    /// Lower and upper corner of the box around the voxels in metres, 2 x 3.
+    #[getter]
+    fn bounds<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        corners(py, &self.0.bounds_m)
+    }
+
+    /// Mean of the centers in metres.
+    #[getter]
+    fn center<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        column(py, self.0.center_m.to_vec())
+    }
+
+    /// Mean colour of the points that hit it, red, green, blue from 0 to 255; `None` without this layer.
+    #[getter]
+    fn colour(&self) -> Option<(u8, u8, u8)> {
+        self.0.colour.map(Into::into)
+    }
+
+    /// Class of most points that hit it; `None` without this layer.
+    #[getter]
+    fn class_(&self) -> Option<u8> {
+        self.0.class
+    }
+
+    /// Time stamp of the first scan that hit it in nanoseconds; `None` without this layer.
+    #[getter]
+    fn first_ns(&self) -> Option<i64> {
+        self.0.time_ns.map(|[first, _]| first)
+    }
+
+    /// Time stamp of the last scan that hit it in nanoseconds; `None` without this layer.
+    #[getter]
+    fn last_ns(&self) -> Option<i64> {
+        self.0.time_ns.map(|[_, last]| last)
+    }
+
+    fn __repr__(&self) -> String {
+        let ([x, y, z], change) = (self.0.center_m, &self.0);
+        let (number, kind, voxels) = (change.number, change.kind.name(), change.voxels);
+        format!("<voxtile.Change {number}: {voxels} voxels {kind} around {x:.2} {y:.2} {z:.2}>")
+    }
+}
+
+/// Converts a box to an array of 2 x 3.
+pub fn corners<'py>(py: Python<'py>, bounds_m: &Aabb) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    rows(py, vec![bounds_m.min, bounds_m.max])
+}
