@@ -46,6 +46,8 @@ voxtile=$(realpath "$voxtile") program=${program:+$(realpath "$program")}
 radius=2.5 max_z=1.0 inflation_range=2.2 layers=colour,intensity=100,class,time,shape
 outputs="--max-range 60 --publish-every 0.2 --publish-radius $radius --projected-radius 30 --occupancy-max-z $max_z"
 outputs="$outputs --inflation-range $inflation_range"
+# As in tests/frontier_outputs.py.
+outputs="$outputs --frontiers --frontier-radius 2 --frontier-height 1 --frontier-min-area 0.05 --frontier-every 0.2"
 
 # Prints the failure and the log of the node.
 fail() {

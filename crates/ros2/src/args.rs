@@ -1,5 +1,6 @@
 use crate::clearing_rule::ClearingRule;
 use crate::distances::Distances;
+use crate::frontiers::Frontiers;
 use crate::ground_filter::GroundFilter;
 use crate::layer_list::LayerList;
 use crate::listen_address::ListenAddress;
@@ -190,6 +191,22 @@ pub struct Args {
     /// Interval between publications of distances; without subscribers they are not computed
     #[arg(long, value_name = "S", default_value_t = 0.2)]
     pub distance_every: f64,
+
+    /// Publish the frontiers around the sensor (topics frontiers, frontier_goals)
+    #[arg(long)]
+    pub frontiers: bool,
+    /// Publish frontiers up to this horizontal distance from the sensor
+    #[arg(long, value_name = "M", default_value_t = 10.0)]
+    pub frontier_radius: f64,
+    /// Publish frontiers up to this height above and below the sensor
+    #[arg(long, value_name = "M", default_value_t = 2.0)]
+    pub frontier_height: f64,
+    /// Omit frontiers with less area, in square metres
+    #[arg(long, value_name = "M2", default_value_t = 0.5)]
+    pub frontier_min_area: f64,
+    /// Interval between publications of frontiers; without subscribers they are not computed
+    #[arg(long, value_name = "S", default_value_t = 1.0)]
+    pub frontier_every: f64,
 
     /// Name of the node; also the prefix of some service names
     #[arg(long, value_name = "NAME", default_value = DEFAULT_NODE_NAME)]
@@ -401,6 +418,21 @@ impl Args {
     /// Invalid lengths or an invalid duration.
     pub fn distances(&self) -> anyhow::Result<Distances> {
         Distances::new(self.distance_every, self.distance_max, self.distance_radius, self.distance_height)
+    }
+
+    /// Returns the parameters of the frontiers, if they are published.
+    ///
+    /// # Errors
+    ///
+    /// Invalid lengths, an invalid area or an invalid duration.
+    pub fn frontiers(&self) -> anyhow::Result<Option<Frontiers>> {
+        let frontiers = Frontiers::new(
+            self.frontier_every,
+            self.frontier_min_area,
+            self.frontier_radius,
+            self.frontier_height,
+        )?;
+        Ok(self.frontiers.then_some(frontiers))
     }
 
     /// Returns the box outside of which points are ignored, in the map frame.

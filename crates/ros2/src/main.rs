@@ -24,6 +24,7 @@ mod distances;
 mod drop_warnings;
 mod first_map;
 mod frame_owners;
+mod frontiers;
 mod ground_filter;
 mod health;
 mod inbox;

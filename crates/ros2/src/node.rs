@@ -3,7 +3,7 @@ use crate::arrival_watch::ArrivalWatch;
 use crate::inbox::Inbox;
 use crate::live_map::LiveMap;
 use crate::monitor::{Monitor, MonitorServer};
-use crate::publishers::{DistancePublisher, PUBLISHED_CLOUDS, Publishing};
+use crate::publishers::{DistancePublisher, FrontierPublisher, PUBLISHED_CLOUDS, Publishing};
 use crate::services::{self, Orders};
 use crate::transport::{Message, Qos, Transport, TypeName, spawn};
 use std::sync::Arc;
@@ -77,6 +77,10 @@ pub fn start(
     services::start(args, &mut transport, &map, orders)?;
     let mut publishing = Publishing::new(args, &mut transport, inbox.clone(), map.clone())?;
     let mut distances = DistancePublisher::new(&mut transport, map.clone(), args.distances()?)?;
+    let frontiers = args
+        .frontiers()?
+        .map(|frontiers| FrontierPublisher::new(&mut transport, map.clone(), frontiers))
+        .transpose()?;
     let arrivals = ArrivalWatch::new(args, inbox.clone(), transport.graph(), &PUBLISHED_CLOUDS)?;
     let stop = Arc::new(AtomicBool::new(false));
     let (of_publishing, of_arrivals, of_distances) = (stop.clone(), stop.clone(), stop.clone());
@@ -85,6 +89,10 @@ pub fn start(
         spawn("distances", move || distances.run(&of_distances))?,
         spawn("arrivals", move || arrivals.run(&of_arrivals))?,
     ];
+    if let Some(mut frontiers) = frontiers {
+        let of_frontiers = stop.clone();
+        threads.push(spawn("frontiers", move || frontiers.run(&of_frontiers))?);
+    }
     if let Some(server) = server {
         let memory_limit_bytes = args.memory.as_u64();
         let monitor = Arc::new(Monitor { inbox: inbox.clone(), map, memory_limit_bytes });

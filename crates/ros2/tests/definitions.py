@@ -44,6 +44,7 @@ MESSAGES = [
     "octomap_msgs/Octomap",
     "visualization_msgs/MarkerArray",
     "nav_msgs/OccupancyGrid",
+    "geometry_msgs/PoseArray",
     "diagnostic_msgs/DiagnosticArray",
 ]
 

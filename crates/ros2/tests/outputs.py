@@ -19,8 +19,9 @@ from cyclonedds.domain import DomainParticipant
 from cyclonedds.sub import DataReader
 from cyclonedds.topic import Topic
 from definitions import typestore
+from frontier_outputs import compare_frontiers, plain_markers
 from octrees import binary_leaves, full_leaves, octets, voxels_of
-from ros_messages import LATCHED, RELIABLE, MarkerArray, OccupancyGrid, Octomap, PointCloud2
+from ros_messages import LATCHED, RELIABLE, MarkerArray, OccupancyGrid, Octomap, PointCloud2, PoseArray
 
 TYPES = {
     "octomap_binary": (Octomap, "octomap_msgs/msg/Octomap"),
@@ -32,6 +33,8 @@ TYPES = {
     "local_occupied": (PointCloud2, "sensor_msgs/msg/PointCloud2"),
     "local_inflated": (PointCloud2, "sensor_msgs/msg/PointCloud2"),
     "distance_field": (PointCloud2, "sensor_msgs/msg/PointCloud2"),
+    "frontiers": (MarkerArray, "visualization_msgs/msg/MarkerArray"),
+    "frontier_goals": (PoseArray, "geometry_msgs/msg/PoseArray"),
 }
 
 
@@ -67,6 +70,11 @@ def plain(name, message):
         scale = [marker.scale.x, marker.scale.y, marker.scale.z]
         frame = marker.header.frame_id
         return {"frame": frame, "type": marker.type, "action": marker.action, "scale": scale, "points": points}
+    if name == "frontiers":
+        return {"frame": message.markers[0].header.frame_id, "markers": plain_markers(message)}
+    if name == "frontier_goals":
+        places = [pose.position for pose in message.poses]
+        return {"frame": message.header.frame_id, "points": [[place.x, place.y, place.z] for place in places]}
     if TYPES[name][0] is PointCloud2:
         names = ["x", "y", "z", "distance"][: 4 if name == "distance_field" else 3]
         found = [field.name for field in message.fields]
@@ -227,8 +235,12 @@ def compare(file, all_csv, pgm, origin, radius, max_z, moment, inflation_range):
     corner = [float(at) for at in open(pgm.replace(".pgm", ".yaml")).read().split("origin: [")[1].split(",")[:2]]
     assert grid["origin"] == [*corner, 0.0], f"{grid['origin']} and {corner}"
     compare_distances(got, log_odds, occupied, centers, origin, radius, resolution)
+    frontiers = compare_frontiers(got, all_csv, origin, resolution)
     local = compare_local(got, occupied, centers, origin, radius, moment, inflation_range, resolution)
-    print(f"outputs: {len(log_odds)} voxels, {local}, {len(low)} of {len(occupied)} occupied ones below, {size} cells")
+    print(
+        f"outputs: {len(log_odds)} voxels, {local}, {len(low)} of {len(occupied)} occupied ones below, {size} cells, "
+        f"{frontiers} frontiers"
+    )
 
 
 def compare_whole(file, all_csv):

@@ -107,6 +107,12 @@ class Pose(IdlStruct, typename="geometry_msgs::msg::dds_::Pose_"):
 
 
 @dataclass
+class PoseArray(IdlStruct, typename="geometry_msgs::msg::dds_::PoseArray_"):
+    header: Header
+    poses: sequence[Pose]
+
+
+@dataclass
 class PoseWithCovariance(IdlStruct, typename="geometry_msgs::msg::dds_::PoseWithCovariance_"):
     pose: Pose
     covariance: array[float64, 36]

@@ -24,6 +24,8 @@ PUBLISHED = {
     "/local_occupied": "sensor_msgs::msg::dds_::PointCloud2_",
     "/local_inflated": "sensor_msgs::msg::dds_::PointCloud2_",
     "/distance_field": "sensor_msgs::msg::dds_::PointCloud2_",
+    "/frontiers": "visualization_msgs::msg::dds_::MarkerArray_",
+    "/frontier_goals": "geometry_msgs::msg::dds_::PoseArray_",
     "/diagnostics": "diagnostic_msgs::msg::dds_::DiagnosticArray_",
 }
 

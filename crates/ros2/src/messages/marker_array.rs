@@ -60,9 +60,12 @@ pub struct MarkerArray {
     pub markers: Vec<Marker>,
 }
 
+const CUBE: i32 = 1;
+const SPHERE: i32 = 2;
 const CUBE_LIST: i32 = 6;
 const ADD: i32 = 0;
 const DELETE: i32 = 2;
+const DELETE_ALL: i32 = 3;
 
 impl Color {
     /// Returns an opaque color.
@@ -75,18 +78,44 @@ impl Color {
 impl Marker {
     /// Returns cubes of one size and color. Without cubes, the marker deletes the previous ones.
     pub fn of_cubes(header: Header, edge_m: f64, color: Color, centers_m: Vec<[f64; 3]>) -> Self {
+        let action = if centers_m.is_empty() { DELETE } else { ADD };
+        let cubes = Self { scale: [edge_m; 3], color, points: centers_m, ..Self::empty(header) };
+        Self { ns: "map".to_owned(), kind: CUBE_LIST, action, ..cubes }
+    }
+
+    /// Returns a cube.
+    pub fn cube(header: Header, size_m: [f64; 3], color: Color, center_m: [f64; 3]) -> Self {
+        Self { kind: CUBE, scale: size_m, color, pose: Pose::at(center_m), ..Self::empty(header) }
+    }
+
+    /// Returns a sphere.
+    pub fn sphere(header: Header, size_m: [f64; 3], color: Color, center_m: [f64; 3]) -> Self {
+        Self { kind: SPHERE, ..Self::cube(header, size_m, color, center_m) }
+    }
+
+    /// Returns the marker with a name, by which a later one replaces it.
+    pub fn named(self, ns: &str, id: i32) -> Self {
+        Self { ns: ns.to_owned(), id, ..self }
+    }
+
+    /// Returns a marker that deletes all previous ones of the topic.
+    pub fn that_deletes_all(header: Header) -> Self {
+        Self { action: DELETE_ALL, ..Self::empty(header) }
+    }
+
+    fn empty(header: Header) -> Self {
         Self {
             header,
-            ns: "map".to_owned(),
+            ns: String::new(),
             id: 0,
-            kind: CUBE_LIST,
-            action: if centers_m.is_empty() { DELETE } else { ADD },
+            kind: 0,
+            action: ADD,
             pose: Pose::at([0.0; 3]),
-            scale: [edge_m; 3],
-            color,
+            scale: [0.0; 3],
+            color: Color::of_bytes([0; 3]),
             lifetime: Time::default(),
             frame_locked: false,
-            points: centers_m,
+            points: Vec::new(),
             colors: Vec::new(),
             texture_resource: String::new(),
             texture: CompressedImage::default(),

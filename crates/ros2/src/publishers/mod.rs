@@ -5,6 +5,7 @@
 //! occupied_voxels -> VoxelChanges -> Viewers -> Changing: sends changes
 //! LocalView -> local_obstacles -> messages
 //! LiveMap -> LiveDistances -> distance_field -> messages, in a thread of its own
+//! LiveMap -> LiveView -> frontiers -> messages, in a thread of its own
 //! Health, Counters -> diagnostics
 //! Publishing: one thread for the other topics, concurrent with the mapper; Outlet: a topic and the last sent version
 //! ```
@@ -15,6 +16,7 @@ mod diagnosing;
 mod diagnostics;
 mod distance_field;
 mod extent;
+mod frontiers;
 mod local_obstacles;
 mod occupied_voxels;
 mod octomap;
@@ -26,5 +28,6 @@ mod voxel_changes;
 
 pub use distance_field::DistancePublisher;
 pub use extent::Extent;
+pub use frontiers::FrontierPublisher;
 pub use octomap::{class_of, format_of, octomap};
 pub use publishing::{PUBLISHED_CLOUDS, Publishing};

@@ -6,7 +6,7 @@ pub fn type_hash(kind: TypeName) -> Option<&'static str> {
 }
 
 /// Hashes of all types that the node uses. `tests/type_hashes.py` computes them from the definitions and compares.
-const HASHES: [(TypeName, &str); 17] = [
+const HASHES: [(TypeName, &str); 18] = [
     (
         TypeName::new("sensor_msgs", "PointCloud2"),
         "RIHS01_9198cabf7da3796ae6fe19c4cb3bdd3525492988c70522628af5daa124bae2b5",
@@ -34,6 +34,10 @@ const HASHES: [(TypeName, &str); 17] = [
     (
         TypeName::new("nav_msgs", "OccupancyGrid"),
         "RIHS01_8d348150c12913a31ee0ec170fbf25089e4745d17035792a1ba94d6f0bc0cfc7",
+    ),
+    (
+        TypeName::new("geometry_msgs", "PoseArray"),
+        "RIHS01_af0cc36d190e104d546d168d6b39df04fa4b4ccecf59cb4c9ed328d3d5004aa0",
     ),
     (
         TypeName::new("diagnostic_msgs", "DiagnosticArray"),
