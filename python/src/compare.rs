@@ -210,8 +210,8 @@ impl Comparison {
         self.grid.resolution_m()
     }
 
-    /// Centers in metres (`float64`, N x 3) and classes (`uint8`, see `CLASSES`) of the occupied voxels of both maps, or
-    /// of the change with a number. Reads the maps again; an open map must not have changed since.
+    /// Centers in metres (`float64`, N x 3) and classes (`uint8`, see `CLASSES`) of the occupied voxels of both maps,
+    /// or of the change with a number. Reads the maps again; an open map must not have changed since.
     #[pyo3(signature = (change=None))]
     fn voxels<'py>(&self, py: Python<'py>, change: Option<u32>) -> PyResult<Voxels<'py>> {
         if let Some(number) = change

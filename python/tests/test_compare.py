@@ -207,7 +207,7 @@ def test_open_maps_snapshots_and_octomap_files(maps: tuple[Path, Path], tmp_path
         assert voxtile.compare(octree, f"{tuesday}@kept").counts == of_file.counts
 
 
-def test_results_as_the_command_prints_them_as_geojson_and_in_notebooks(maps: tuple[Path, Path], tmp_path: Path) -> None:
+def test_results_as_json_as_geojson_and_in_notebooks(maps: tuple[Path, Path], tmp_path: Path) -> None:
     found = voxtile.compare(*maps)
     command = [sys.executable, "-m", "voxtile", "compare", *map(str, maps), "--json", "--list", "changes.geojson"]
     printed = json.loads(subprocess.run(command, cwd=tmp_path, capture_output=True, check=True).stdout)

@@ -3,17 +3,17 @@
 use testkit::support::cases;
 use voxtile::nalgebra::{Isometry3, Translation3, UnitQuaternion};
 use voxtile::scan::Pose;
-use voxtile::{Aabb, Clearing, InMemoryMapper, MapConfig, Mapper, Point};
+use voxtile::{Aabb, Clearing, InMemoryMapper, MapConfig, Mapper, Point, Scan};
 use voxtile_compare::{Change, ChangeKind, CompareOptions, Comparison, compare};
 use voxtile_simulation::{Lidar, Random, Scene, Solid, World};
 
-const RESOLUTION_M: f64 = 0.1;
+pub const RESOLUTION_M: f64 = 0.1;
 /// Hall of 18 x 10 x 4 m.
 const HALL_M: [f64; 3] = [18.0, 10.0, 4.0];
 const HEIGHT_M: f64 = 1.4;
 
 /// Things in the hall at one time.
-struct Hall(Vec<Solid>);
+pub struct Hall(Vec<Solid>);
 
 impl World for Hall {
     fn scene(&self, center: Point, radius_m: f64) -> Scene {
@@ -31,15 +31,15 @@ impl World for Hall {
 }
 
 /// Things of one size: some stay, some vanish, some appear.
-struct Setting {
-    stays: Vec<Solid>,
-    vanishes: Vec<Solid>,
-    appears: Vec<Solid>,
+pub struct Setting {
+    pub stays: Vec<Solid>,
+    pub vanishes: Vec<Solid>,
+    pub appears: Vec<Solid>,
 }
 
 impl Setting {
     /// Cubes with edges of some voxels in a grid, on the floor and at several heights.
-    fn of_cubes(voxels: u32, seed: u64) -> Self {
+    pub fn of_cubes(voxels: u32, seed: u64) -> Self {
         let mut random = Random::of(seed, &[i64::from(voxels)]);
         let mut setting = Self { stays: Vec::new(), vanishes: Vec::new(), appears: Vec::new() };
         let edge_m = f64::from(voxels) * RESOLUTION_M;
@@ -60,19 +60,17 @@ impl Setting {
     }
 
     /// The things of an epoch: 0 or 1.
-    fn of_epoch(&self, epoch: u64) -> Hall {
+    pub fn of_epoch(&self, epoch: u64) -> Hall {
         let changing = if epoch == 0 { &self.vanishes } else { &self.appears };
         Hall(self.stays.iter().chain(changing).copied().collect())
     }
 }
 
-/// Maps an epoch from a walk along the hall. All points are moved by a drift along x and y.
-fn map_of(hall: &Hall, epoch: u64, drift_m: f64) -> InMemoryMapper {
-    let config = MapConfig::new(RESOLUTION_M, 10.0).unwrap().with_clearing(Clearing::guarded());
-    let mut map = InMemoryMapper::new(config).unwrap();
+/// The scans of a walk along the hall. All points are moved by a drift along x and y.
+pub fn walk(hall: &Hall, epoch: u64, drift_m: f64) -> impl Iterator<Item = Scan> {
     let mut lidar = Lidar::indoor();
     (lidar.beams, lidar.rays_per_beam, lidar.elevation_deg) = (64, 600, [-60.0, 45.0]);
-    for number in 0..24_u32 {
+    (0..24_u32).map(move |number| {
         // The walks differ a little.
         let x = 0.7 + 0.72 * f64::from(number) + 0.1 * epoch as f64;
         let at = Translation3::new(x, 5.6 - 0.2 * epoch as f64, HEIGHT_M);
@@ -82,6 +80,14 @@ fn map_of(hall: &Hall, epoch: u64, drift_m: f64) -> InMemoryMapper {
             point[0] += drift_m;
             point[1] += drift_m;
         }
+        scan
+    })
+}
+
+fn map_of(hall: &Hall, epoch: u64, drift_m: f64) -> InMemoryMapper {
+    let config = MapConfig::new(RESOLUTION_M, 10.0).unwrap().with_clearing(Clearing::guarded());
+    let mut map = InMemoryMapper::new(config).unwrap();
+    for scan in walk(hall, epoch, drift_m) {
         map.insert_scan(&scan).unwrap();
     }
     map
@@ -175,7 +181,7 @@ fn changes_of_simulated_epochs_are_found() {
 }
 
 /// Screens of 2.5 m around boxes at the wall, a wall, a door leaf, a car.
-fn large_things() -> Setting {
+pub fn large_things() -> Setting {
     let hidden = [6.4, 7.2, 8.0].map(|x| Solid::new([x, 8.2, 0.0], [x + 0.5, 8.7, 1.4], 0.5));
     Setting {
         stays: hidden.to_vec(),

@@ -8,3 +8,4 @@ mod naive;
 mod random_maps;
 mod refused;
 mod volumes;
+mod write_epochs;
