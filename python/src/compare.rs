@@ -14,7 +14,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use voxtile::mapper::MapView;
 use voxtile::store::Extension;
-use voxtile::{Aabb, Grid, Result, Stop};
+use voxtile::{Aabb, Grid, Point, Result, Stop};
 use voxtile_compare::{CompareOptions, VoxelClass, for_each_voxel};
 use voxtile_pipeline::{ComparedMap, change_features, check_crs, class_code, warnings_of};
 
@@ -22,6 +22,8 @@ use voxtile_pipeline::{ComparedMap, change_features, check_crs, class_code, warn
 const DEFAULT_BYTES: usize = 256 << 20;
 
 type Voxels<'py> = (Bound<'py, PyArray2<f64>>, Bound<'py, PyArray1<u8>>);
+/// Centers in metres and classes.
+type Collected = (Vec<Point>, Vec<u8>);
 
 /// An open map, or a place of one.
 #[derive(FromPyObject)]
@@ -133,7 +135,7 @@ impl Comparison {
     }
 
     /// Returns the centers and classes of voxels; those of one change, or all. `None` if a map has changed.
-    fn collect(&self, change: Option<u32>, stop: &Stop) -> Result<Option<(Vec<[f64; 3]>, Vec<u8>)>> {
+    fn collect(&self, change: Option<u32>, stop: &Stop) -> Result<Option<Collected>> {
         let options = self.options.clone().with_stop(stop.clone());
         let classes: &[VoxelClass] = match change {
             Some(_) => &[VoxelClass::Vanished, VoxelClass::Appeared],
