@@ -312,14 +312,7 @@ impl<'a> Columns<'a> {
         };
         let ([x, x_end], [y, y_end]) = (limits(x), limits(y));
         let block = VoxelBox { min: [x, y, i32::MIN], end: [x_end, y_end, i32::MAX] };
-        let Some(region) = self.region else { return block };
-        let within = |corner: [i32; 3], other: [i32; 3], pick: fn(i32, i32) -> i32| {
-            std::array::from_fn(|k| pick(corner[k], other[k]))
-        };
-        VoxelBox {
-            min: within(block.min, region.min, i32::max),
-            end: within(block.end, region.end, i32::min),
-        }
+        self.region.map_or(block, |region| block.intersection(&region))
     }
 
     fn for_each(&self, voxels: &VoxelBox, mut visit: impl FnMut([i32; 2])) {

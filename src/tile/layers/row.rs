@@ -130,12 +130,12 @@ impl Row {
 
     /// Converts the row; `others` are the votes for other classes than the main one.
     pub(super) fn to_layers(
-        &self,
+        self,
         base_ns: i64,
         layers: &Layers,
         others: impl Iterator<Item = ClassVotes>,
     ) -> VoxelLayers {
-        let Self(columns) = *self;
+        let Self(columns) = self;
         let points = columns[POINTS];
         let mut classes: Vec<ClassVotes> = others.collect();
         if let Some(class) = columns[CLASS].checked_sub(1) {
