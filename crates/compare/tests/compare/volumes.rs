@@ -113,7 +113,11 @@ fn volumes_of_random_maps_equal_the_definition() {
 
 /// Floor of 4 x 4 m with a heap, seen from above by vertical rays.
 fn site(heap: impl Fn(i32, i32) -> i32) -> InMemoryMapper {
-    let mut map = InMemoryMapper::new(MapConfig::new(RESOLUTION_M, 10.0).unwrap()).unwrap();
+    site_in_tiles(10.0, heap)
+}
+
+fn site_in_tiles(tile_size_m: f64, heap: impl Fn(i32, i32) -> i32) -> InMemoryMapper {
+    let mut map = InMemoryMapper::new(MapConfig::new(RESOLUTION_M, tile_size_m).unwrap()).unwrap();
     for (x, y) in (0..40).flat_map(|x| (0..40).map(move |y| (x, y))) {
         let center = |k: i32| (f64::from(k) + 0.5) * RESOLUTION_M;
         let point = [center(x), center(y), center(heap(x, y))];
@@ -144,6 +148,14 @@ fn heaps_and_pits_have_their_volume() {
     let plane = volumes_over_plane(&after, 0.05, &VolumeOptions::default(), &|_, _| {}).unwrap();
     assert_near(plane.measured, [16.0, 3.0, 0.0], "plane");
     assert_eq!(plane.measured.cut_m3.to_bits(), 0);
+}
+
+#[test]
+fn the_voxel_above_a_region_may_be_in_another_tile() {
+    let [before, after] = [0, 4].map(|top| site_in_tiles(0.5, move |_, _| top));
+    let region = Aabb { min: [0.0, 0.0, -0.5], max: [4.0, 4.0, 0.5] };
+    let found = volumes(&before, &after, &VolumeOptions::default().with_region(region), &|_, _| {}).unwrap();
+    assert_near(found.measured, [16.0, 16.0 * 0.4, 0.0], "tiles");
 }
 
 #[test]
