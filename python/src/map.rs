@@ -328,8 +328,8 @@ impl Map {
     ///
     /// With `pose` (world_from_sensor: a matrix of 4 x 4, seven numbers x y z qx qy qz qw, or a tuple of position and
     /// quaternion) points are in the sensor's frame; with `origin` they are in the world's. Points that are NaN or
-    /// masked are skipped and counted. `colours` (N x 3, 0 to 255) and `classes` (N, 0 to 255) are for the layers of the
-    /// map; NaN, and a class below 0, mean that a point has none. After an error the map is unchanged.
+    /// masked are skipped and counted. `colours` (N x 3, 0 to 255) and `classes` (N, 0 to 255) are for the layers of
+    /// the map; NaN, and a class below 0, mean that a point has none. After an error the map is unchanged.
     #[pyo3(signature = (points, pose=None, *, origin=None, intensities=None, colours=None, classes=None))]
     #[expect(clippy::too_many_arguments, reason = "keywords, in Python")]
     fn insert<'py>(
@@ -631,8 +631,8 @@ impl Map {
         Ok((array.call_method1("reshape", (edges,))?, column(py, corner.to_vec())))
     }
 
-    /// Distances of the voxels of a region to the nearest obstacle, up to `max_distance`. Obstacles outside of the region
-    /// count.
+    /// Distances of the voxels of a region to the nearest obstacle, up to `max_distance`. Obstacles outside of the
+    /// region count.
     ///
     /// `unknown` voxels have an unknown distance and shorten no other ("unknown"), or are "free" or an "obstacle".
     /// `signed` makes distances inside obstacles negative.
@@ -651,12 +651,12 @@ impl Map {
         Ok(DistanceField::new(field))
     }
 
-    /// Frontiers: clusters of free voxels that share faces with unknown ones, where exploration can continue; the largest
-    /// first.
+    /// Frontiers: clusters of free voxels that share faces with unknown ones, where exploration can continue; the
+    /// largest first.
     ///
     /// `region` is a box, lower and upper corner in metres: only voxels inside count, and the cost depends on the box,
-    /// not on the map. Frontiers with less area than `min_area` in square metres, or fewer voxels than `min_voxels`, are
-    /// left out.
+    /// not on the map. Frontiers with less area than `min_area` in square metres, or fewer voxels than `min_voxels`,
+    /// are left out.
     #[pyo3(signature = (region=None, *, min_area=0.0, min_voxels=8))]
     fn frontiers(
         &self,

@@ -3,7 +3,7 @@ use voxtile::space::Area;
 use voxtile::{Aabb, Error, Grid, Result};
 
 /// Largest number of blocks of columns in an area.
-pub(crate) const MAX_BLOCKS: i64 = 1 << 24;
+pub(crate) const MAX_BLOCKS: i64 = 1 << 22;
 
 /// Options of [`volumes`](crate::volumes()).
 #[derive(Clone, Debug)]

@@ -221,7 +221,8 @@ impl OfLayers {
     }
 
     fn columns(&self) -> impl Iterator<Item = &'static str> {
-        let all = [(self.colour, "color"), (self.class, "points"), (self.time, "first and last hit")];
+        let all =
+            [(self.colour, "color"), (self.class, "class of most points"), (self.time, "first and last hit")];
         all.into_iter().filter(|(has, _)| *has).map(|(_, name)| name)
     }
 
