@@ -1,6 +1,6 @@
 //! `voxtile.compare`: changes between two maps.
 
-use crate::arrays::{column, object, rows};
+use crate::arrays::{Points, column, object, rows};
 use crate::config::bytes_of;
 use crate::errors::{exception_of_kind, wrong};
 use crate::map::{Map, region_of};
@@ -15,7 +15,7 @@ use std::sync::Arc;
 use voxtile::mapper::MapView;
 use voxtile::store::Extension;
 use voxtile::{Aabb, Grid, Point, Result, Stop};
-use voxtile_compare::{CompareOptions, VoxelClass, for_each_voxel};
+use voxtile_compare::{CompareOptions, Viewpoints, VoxelClass, for_each_voxel};
 use voxtile_pipeline::{ComparedMap, change_features, check_crs, class_code, warnings_of};
 
 /// Memory for tiles.
@@ -72,9 +72,13 @@ impl Place {
 /// occupied voxels are the same surface (default: one voxel). A voxel has changed if one map knows it as occupied and
 /// the other as free, each with at least the probability `certainty`. Clusters of fewer than `min_voxels` voxels are
 /// counted, not listed. `region` is a box, lower and upper corner in metres. `memory` is for tiles.
+///
+/// `positions` are those of the sensors of both maps, arrays of N x 3 in metres; default: those of kept scans, for maps
+/// that are not open for writing. With them, voxels that the other map has not seen are hidden, if something is in front
+/// of them wherever the sensor was, or out of view.
 #[pyfunction]
-#[pyo3(signature = (before, after, *, tolerance=None, certainty=0.7, min_voxels=8, region=None, memory=None,
-    progress=None))]
+#[pyo3(signature = (before, after, *, tolerance=None, certainty=0.7, min_voxels=8, region=None,
+    positions=(None, None), memory=None, progress=None))]
 #[expect(clippy::too_many_arguments, reason = "keywords, in Python")]
 pub fn compare(
     py: Python<'_>,
@@ -84,6 +88,7 @@ pub fn compare(
     certainty: f64,
     min_voxels: u64,
     region: Option<Bound<'_, PyAny>>,
+    positions: (Option<Bound<'_, PyAny>>, Option<Bound<'_, PyAny>>),
     memory: Option<Bound<'_, PyAny>>,
     progress: Callback,
 ) -> PyResult<Comparison> {
@@ -94,10 +99,28 @@ pub fn compare(
         .with_region(region.as_ref().map(region_of).transpose()?)
         .with_memory(memory.as_ref().map(bytes_of).transpose()?.unwrap_or(DEFAULT_BYTES));
     let places = [Place::of(py, before)?, Place::of(py, after)?];
+    let points_of = |points: &Bound<'_, PyAny>| Ok(Points::of("positions", points)?.slice()?.to_vec());
+    let positions: [Option<PyResult<Vec<Point>>>; 2] =
+        [positions.0, positions.1].map(|points| points.as_ref().map(points_of));
+    let [of_before, of_after] = positions.map(Option::transpose);
+    let positions = [of_before?, of_after?];
     watched_with_progress(py, progress, |stop, progress| {
         let sides = [places[0].open()?, places[1].open()?];
-        Comparison::of(sides, options.with_stop(stop.clone()), progress)
+        let viewpoints = [viewpoints(&sides[0], &positions[0])?, viewpoints(&sides[1], &positions[1])?];
+        let options = options.with_viewpoints(viewpoints).with_stop(stop.clone());
+        Comparison::of(sides, options, progress)
     })
+}
+
+/// Returns the positions of a map's sensor: those given, or else those of its kept scans.
+fn viewpoints(side: &Side, positions: &Option<Vec<Point>>) -> Result<Option<Viewpoints>> {
+    match positions {
+        None => Ok(side.source.viewpoints()),
+        Some(positions) => {
+            let range_m = side.source.config().rays.max_range_m;
+            Viewpoints::new(positions.iter().copied(), range_m).map(Some)
+        }
+    }
 }
 
 /// Changes between two maps, returned by `voxtile.compare`.

@@ -7,7 +7,8 @@ use std::time::Duration;
 use voxtile::mapper::{LiveReader, MapReader, MapView, Mapper, OctreeMap, Stoppable};
 use voxtile::store::Extension;
 use voxtile::{Error, MapConfig, OutOfCoreTileMapper, Result, Stop};
-use voxtile_pipeline::{MapAt, octree_file};
+use voxtile_compare::Viewpoints;
+use voxtile_pipeline::{MapAt, kept_viewpoints, octree_file};
 
 /// View of a map whose queries end with an error at the next tile after its stop is set.
 pub type View<'a> = Stoppable<'a, dyn MapView + 'a>;
@@ -70,6 +71,14 @@ impl Source {
             Self::Reader(reader) => reader.read().metadata().ext.clone(),
             Self::Octree(_) => None,
             Self::Writer { .. } => MapReader::open(path, LEAST_BYTES).ok()?.metadata().ext.clone(),
+        }
+    }
+
+    /// Returns the positions from which the map's kept scans were taken; `None` if it keeps none, or is open for writing.
+    pub fn viewpoints(&self) -> Option<Viewpoints> {
+        match self {
+            Self::Reader(reader) => kept_viewpoints(&reader.read()),
+            Self::Writer { .. } | Self::Octree(_) => None,
         }
     }
 

@@ -97,6 +97,8 @@ def brute_force(before: NDArray[np.float64], after: NDArray[np.float64], certain
         of_names = (changed, rest & ~known, rest & known & ~changed)
         classes |= dict(zip(names, of_names))
         classes["unchanged"] = occupied & near
+    # Without positions of the sensor.
+    classes["hidden_before"] = classes["hidden_after"] = np.zeros_like(occupied)
     return classes
 
 
@@ -160,6 +162,31 @@ def test_a_comparison_equals_a_brute_force(maps: tuple[Path, Path], certainty: f
             largest = next(change for change in found.changes if change.kind == kind)
             low, high = CUBES[name]
             assert (largest.bounds[0] < high).all() and (largest.bounds[1] > low).all(), kind
+
+
+def test_hidden_voxels_need_positions_of_the_sensor(maps: tuple[Path, Path], tmp_path: Path) -> None:
+    wanted = brute_force(log_odds_of(maps[0]), log_odds_of(maps[1]), 0.7)
+    everywhere = np.mgrid[0.5:6:0.5, 0.5:5:0.5, 0.5:3:0.5].reshape(3, -1).T
+    for positions, hides in [((everywhere, [[3.0, 2.0, 1.3]]), True), (([[900.0, 0.0, 0.0]], np.empty((0, 3))), False)]:
+        found = voxtile.compare(*maps, positions=positions)
+        centers, classes = found.voxels()
+        hidden = 0
+        for epoch, of_epoch in [("before", found.to_dict()["after"]), ("after", found.to_dict()["before"])]:
+            names = [f"not_seen_{epoch}", f"hidden_{epoch}"]
+            is_of = np.isin(classes, [found.CLASSES[name] for name in names])
+            assert rows_of(centers[is_of]) == rows_of(centers_of(np.argwhere(wanted[names[0]])))
+            assert of_epoch["hidden"] == found.counts[names[1]]["voxels"]
+            hidden += of_epoch["hidden"]
+        assert (hidden > 0) == hides
+    # Those of kept scans.
+    for name, cubes, seed in [("one", ["stays"], 1), ("two", ["stays", "appears"], 2)]:
+        mapped(tmp_path / name, cubes, seed, keep_scans=True).close()
+    own = voxtile.compare(tmp_path / "one", tmp_path / "two")
+    positions = [[[0.8 + 0.5 * number, 2.5 + 0.1 * seed, 1.3] for number in range(8)] for seed in (1, 2)]
+    assert own.to_dict() == voxtile.compare(tmp_path / "one", tmp_path / "two", positions=tuple(positions)).to_dict()
+    assert own.to_dict()["before"]["hidden"] is not None
+    with pytest.raises(errors.ArgumentError, match="positions: must be an array of N x 3"):
+        voxtile.compare(*maps, positions=([1.0, 2.0], None))
 
 
 def test_a_region_and_a_tolerance(maps: tuple[Path, Path]) -> None:

@@ -61,6 +61,11 @@ impl Bits {
         self.words[(z * self.cube.edge + y) * self.row_words + x / 64] >> (x % 64) & 1 == 1
     }
 
+    /// Adds the voxel at a position.
+    pub(crate) fn insert(&mut self, [x, y, z]: [usize; 3]) {
+        self.words[(z * self.cube.edge + y) * self.row_words + x / 64] |= 1 << (x % 64);
+    }
+
     /// Adds the voxels of a brick that are in the box.
     pub(crate) fn add_brick(&mut self, lowest: VoxelIndex, mask: &BrickMask) {
         let edge = self.cube.edge as i64;
@@ -68,8 +73,7 @@ impl Bits {
         for place in places(*mask) {
             let [x, y, z] = std::array::from_fn(|k| from[k] + i64::from(IN_BRICK[place][k]));
             if [x, y, z].iter().all(|k| (0..edge).contains(k)) {
-                let (x, y, z) = (x as usize, y as usize, z as usize);
-                self.words[(z * self.cube.edge + y) * self.row_words + x / 64] |= 1 << (x % 64);
+                self.insert([x as usize, y as usize, z as usize]);
             }
         }
     }
@@ -79,7 +83,7 @@ impl Bits {
         for z in min[2]..end[2] {
             for y in min[1]..end[1] {
                 for x in min[0]..end[0] {
-                    self.words[(z * self.cube.edge + y) * self.row_words + x / 64] |= 1 << (x % 64);
+                    self.insert([x, y, z]);
                 }
             }
         }

@@ -1,7 +1,7 @@
 use rustc_hash::FxHashSet;
 use voxtile::mapper::MapView;
 use voxtile::space::{LAST_VOXEL_INDEX, TileBox, VoxelBox};
-use voxtile::{Grid, TileIndex};
+use voxtile::{Aabb, Grid, TileIndex, VoxelIndex};
 
 /// Voxels along the edge of a block: the unit of work, which does not depend on the tiles of the maps.
 pub(crate) const BLOCK_EDGE: i64 = 128;
@@ -24,6 +24,17 @@ impl Cube {
     /// Returns the cube enlarged on all sides.
     pub(crate) fn grown(self, voxels: u32) -> Self {
         Self { min: self.min.map(|k| k - i64::from(voxels)), edge: self.edge + 2 * voxels as usize }
+    }
+
+    /// Voxel at a position in the cube. Only voxels with indices are observed.
+    pub(crate) fn voxel_at(self, place: [usize; 3]) -> VoxelIndex {
+        std::array::from_fn(|k| (self.min[k] + place[k] as i64) as i32)
+    }
+
+    /// The cube in metres.
+    pub(crate) fn bounds_m(self, grid: &Grid) -> Aabb {
+        let corner_m = |k: i64| k as f64 * grid.resolution_m();
+        Aabb { min: self.min.map(corner_m), max: self.min.map(|k| corner_m(k + self.edge as i64)) }
     }
 
     /// The voxels that have indices.

@@ -36,8 +36,10 @@ impl Comparison {
             VoxelClass::Unchanged => self.after.unchanged,
             VoxelClass::Appeared => self.after.changed,
             VoxelClass::Vanished => self.before.changed,
-            VoxelClass::NotSeenBefore => self.after.not_seen,
-            VoxelClass::NotSeenAfter => self.before.not_seen,
+            VoxelClass::NotSeenBefore => self.after.not_seen - self.after.hidden.unwrap_or(0),
+            VoxelClass::NotSeenAfter => self.before.not_seen - self.before.hidden.unwrap_or(0),
+            VoxelClass::HiddenBefore => self.after.hidden.unwrap_or(0),
+            VoxelClass::HiddenAfter => self.before.hidden.unwrap_or(0),
             VoxelClass::UncertainAppeared => self.after.uncertain,
             VoxelClass::UncertainVanished => self.before.uncertain,
         }
@@ -56,6 +58,9 @@ pub struct EpochCounts {
     pub changed: u64,
     /// Unknown in the other map.
     pub not_seen: u64,
+    /// Of these, those that were hidden from the other map's sensor: from all positions within its range something was
+    /// in front. `None` if the positions are not known.
+    pub hidden: Option<u64>,
     /// Seen free in the other map, but one of the maps has too little evidence, or the other one has not observed all
     /// six neighbors.
     pub uncertain: u64,
@@ -77,6 +82,7 @@ impl std::ops::AddAssign for EpochCounts {
         self.unchanged += other.unchanged;
         self.changed += other.changed;
         self.not_seen += other.not_seen;
+        self.hidden = self.hidden.zip(other.hidden).map(|(own, other)| own + other);
         self.uncertain += other.uncertain;
     }
 }

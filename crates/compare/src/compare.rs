@@ -2,8 +2,9 @@ use crate::bits::Bits;
 use crate::block_bits::BlockBits;
 use crate::blocks::{BlockIndex, Cube, blocks_of, may_be_occupied};
 use crate::change::{Change, ChangeKind, Clusters, Comparison, EpochCounts};
-use crate::classify::{ClassBits, reach};
+use crate::classify::{ClassBits, NOT_SEEN, reach};
 use crate::components::{Components, order};
+use crate::hidden::hidden;
 use crate::joined::{BlockParts, Joined};
 use crate::mask_reader::{MaskReader, TilesOfBatch};
 use crate::options::CompareOptions;
@@ -56,9 +57,10 @@ pub fn compare<A: MapView, B: MapView>(
     progress: &(dyn Fn(u64, u64) + Sync),
 ) -> Result<Comparison> {
     let comparer = Comparer::new(before, after, options)?;
-    let mut counts = [EpochCounts::default(); 2];
+    let mut counts = comparer.counts();
     let mut joined = KINDS.map(|_| Joined::new(options.min_voxels.max(1)));
     comparer.for_each_block(
+        &VoxelClass::ALL,
         progress,
         |block, classes| comparer.block_result(block, classes),
         |block, result| {
@@ -141,9 +143,22 @@ impl<'a, A: MapView, B: MapView> Comparer<'a, A, B> {
         })
     }
 
-    /// Classifies the voxels of all blocks with occupied voxels.
+    /// Counts of no voxels.
+    fn counts(&self) -> [EpochCounts; 2] {
+        let [earlier, later] = self.is_hidden_known().map(|is_known| is_known.then_some(0));
+        [later, earlier].map(|hidden| EpochCounts { hidden, ..EpochCounts::default() })
+    }
+
+    /// Whether what the earlier and what the later map has not seen is told apart.
+    fn is_hidden_known(&self) -> [bool; 2] {
+        [0, 1].map(|k| self.options.viewpoints[k].is_some())
+    }
+
+    /// Classifies the voxels of all blocks with occupied voxels. Hidden voxels are only told apart if `wanted` has a
+    /// class of them.
     pub(crate) fn for_each_block<T: Send>(
         &self,
+        wanted: &[VoxelClass],
         progress: &(dyn Fn(u64, u64) + Sync),
         work: impl Fn(BlockIndex, &ClassBits) -> Result<T> + Sync,
         take: impl FnMut(BlockIndex, T) -> Result<()>,
@@ -164,7 +179,7 @@ impl<'a, A: MapView, B: MapView> Comparer<'a, A, B> {
                 let tiles = [self.tiles_around(blocks, before.map()), self.tiles_around(blocks, after.map())];
                 Ok(LoadedTiles([before.read(&tiles[0])?, after.read(&tiles[1])?]))
             },
-            |block, loaded| work(block, &self.classes_of(block, loaded)),
+            |block, loaded| work(block, &self.classes_of(block, loaded, wanted)?),
             take,
         )
     }
@@ -193,7 +208,12 @@ impl<'a, A: MapView, B: MapView> Comparer<'a, A, B> {
         tiles
     }
 
-    fn classes_of(&self, block: BlockIndex, LoadedTiles(loaded): &LoadedTiles) -> ClassBits {
+    fn classes_of(
+        &self,
+        block: BlockIndex,
+        LoadedTiles(loaded): &LoadedTiles,
+        wanted: &[VoxelClass],
+    ) -> Result<ClassBits> {
         let own = Cube::of_block(block);
         let cube = own.grown(reach(self.tolerance_voxels));
         let before = BlockBits::of(cube, &cube.tiles(self.before), &loaded[0]);
@@ -205,7 +225,19 @@ impl<'a, A: MapView, B: MapView> Comparer<'a, A, B> {
         };
         let moved = |place: [usize; 3]| place.map(|k| k + reach(self.tolerance_voxels) as usize);
         inside.add_box(moved(min), moved(end));
-        ClassBits::of(&before, &after, &inside, self.tolerance_voxels)
+        let mut classes = ClassBits::of(&before, &after, &inside, self.tolerance_voxels);
+        for (number, not_seen) in NOT_SEEN.into_iter().enumerate() {
+            let Some(viewpoints) = &self.options.viewpoints[number] else { continue };
+            if not_seen.iter().any(|class| wanted.contains(class)) {
+                let voxels = classes.of_class(not_seen[0]);
+                let found = match number {
+                    0 => hidden(self.before, viewpoints, voxels)?,
+                    _ => hidden(self.after, viewpoints, voxels)?,
+                };
+                classes.hide(not_seen, found);
+            }
+        }
+        Ok(classes)
     }
 
     fn block_result(&self, block: BlockIndex, classes: &ClassBits) -> Result<BlockResult> {
@@ -218,7 +250,7 @@ impl<'a, A: MapView, B: MapView> Comparer<'a, A, B> {
             appeared.add_layers(self.after)?;
         }
         let parts = components.map(|components| BlockParts::of(components, block));
-        Ok(BlockResult { counts: classes.counts(), parts })
+        Ok(BlockResult { counts: classes.counts(self.is_hidden_known()), parts })
     }
 }
 

@@ -114,7 +114,7 @@ impl Components {
                 parts.push(Sums::default());
                 parts.len() as u32 - 1
             });
-            parts[part as usize].add(&Sums::of_run(run, |place| voxel_at(cube, place)));
+            parts[part as usize].add(&Sums::of_run(run, |place| cube.voxel_at(place)));
             part_of_run.push(part);
         }
         Self { cube, runs, part_of_run, parts }
@@ -124,7 +124,7 @@ impl Components {
     pub(crate) fn voxels(&self) -> impl Iterator<Item = (VoxelIndex, u32)> {
         self.runs.iter().zip(&self.part_of_run).flat_map(move |(run, &part)| {
             let (y, z) = (usize::from(run.y), usize::from(run.z));
-            (run.x..run.end).map(move |x| (voxel_at(self.cube, [usize::from(x), y, z]), part))
+            (run.x..run.end).map(move |x| (self.cube.voxel_at([usize::from(x), y, z]), part))
         })
     }
 
@@ -172,9 +172,4 @@ impl Components {
         }
         Ok(())
     }
-}
-
-/// Voxel at a position in a cube. Only voxels with indices are observed.
-fn voxel_at(cube: Cube, place: [usize; 3]) -> VoxelIndex {
-    std::array::from_fn(|k| (cube.min[k] + place[k] as i64) as i32)
 }

@@ -7,6 +7,7 @@
 //! map -> tile_masks, mask_reader                  known, occupied, surely occupied, surely free voxels of tiles
 //!     -> blocks, block_bits, bits                  the same as bits of a block of 128 x 128 x 128 voxels and around it
 //!     -> classify                                 a class for each occupied voxel
+//! viewpoints -> hidden                            of those not seen, the ones that something was in front of
 //!     -> components                               connected voxels of a class within a block
 //!     -> joined                                   the same across blocks
 //! compare -> Comparison                           counts, and the list of changes
@@ -30,6 +31,7 @@ mod components;
 mod frontier_goals;
 mod frontier_search;
 mod frontiers;
+mod hidden;
 mod joined;
 mod mask_reader;
 mod options;
@@ -37,6 +39,7 @@ mod sets;
 mod sweep;
 mod tile_masks;
 mod tops;
+mod viewpoints;
 mod visit;
 mod volume_options;
 mod volumes;
@@ -46,6 +49,7 @@ pub use change::{Change, ChangeKind, Clusters, Comparison, EpochCounts};
 pub use compare::compare;
 pub use frontiers::{Coverage, Frontier, FrontierOptions, frontiers, frontiers_in};
 pub use options::{CompareOptions, MAX_TOLERANCE_VOXELS};
+pub use viewpoints::Viewpoints;
 pub use visit::{ComparedVoxel, for_each_voxel};
 pub use volume_options::VolumeOptions;
 pub use volumes::{VolumeSums, Volumes, volumes, volumes_over_plane};

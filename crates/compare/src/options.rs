@@ -1,3 +1,4 @@
+use crate::viewpoints::Viewpoints;
 use voxtile::maths::least_logit;
 use voxtile::scan::Stop;
 use voxtile::{Aabb, Error, Grid, Result};
@@ -20,6 +21,9 @@ pub struct CompareOptions {
     pub certainty: f64,
     /// Box in metres: only voxels whose center is inside are compared. Default: all.
     pub region: Option<Aabb>,
+    /// Positions of the sensors of the earlier and the later map, if they are known: what one map has not observed is
+    /// then told apart into hidden and out of view. Default: unknown.
+    pub viewpoints: [Option<Viewpoints>; 2],
     /// Bytes of memory for tiles, but at least what one block needs. Default: 256 MiB.
     pub memory_bytes: usize,
     /// Stops the comparison.
@@ -33,6 +37,7 @@ impl Default for CompareOptions {
             min_voxels: 8,
             certainty: 0.7,
             region: None,
+            viewpoints: [None, None],
             memory_bytes: 256 << 20,
             stop: Stop::default(),
         }
@@ -58,6 +63,11 @@ impl CompareOptions {
     /// Sets the box in metres.
     pub fn with_region(self, region: impl Into<Option<Aabb>>) -> Self {
         Self { region: region.into(), ..self }
+    }
+
+    /// Sets the positions of the sensors of both maps.
+    pub fn with_viewpoints(self, viewpoints: [Option<Viewpoints>; 2]) -> Self {
+        Self { viewpoints, ..self }
     }
 
     /// Sets the bytes of memory for tiles.

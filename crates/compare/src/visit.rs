@@ -34,6 +34,7 @@ pub fn for_each_voxel<A: MapView, B: MapView>(
     progress: &(dyn Fn(u64, u64) + Sync),
 ) -> Result<()> {
     Comparer::new(before, after, options)?.for_each_block(
+        classes,
         progress,
         |_, bits| {
             let wanted = VoxelClass::ALL.into_iter().filter(|class| classes.contains(class));

@@ -10,9 +10,9 @@ pub enum VoxelClass {
     Appeared,
     /// Occupied in the earlier map, seen free in the later one.
     Vanished,
-    /// Occupied in the later map, unknown in the earlier one.
+    /// Occupied in the later map, unknown in the earlier one and not known to be hidden in it.
     NotSeenBefore,
-    /// Occupied in the earlier map, unknown in the later one.
+    /// Occupied in the earlier map, unknown in the later one and not known to be hidden in it.
     NotSeenAfter,
     /// As [`VoxelClass::Appeared`], but one of the maps has too little evidence, or the earlier one has not observed all
     /// six neighbors.
@@ -20,11 +20,15 @@ pub enum VoxelClass {
     /// As [`VoxelClass::Vanished`], but one of the maps has too little evidence, or the later one has not observed all
     /// six neighbors.
     UncertainVanished,
+    /// Occupied in the later map, and hidden from the sensor of the earlier one.
+    HiddenBefore,
+    /// Occupied in the earlier map, and hidden from the sensor of the later one.
+    HiddenAfter,
 }
 
 impl VoxelClass {
     /// All classes.
-    pub const ALL: [Self; 7] = [
+    pub const ALL: [Self; 9] = [
         Self::Unchanged,
         Self::Appeared,
         Self::Vanished,
@@ -32,7 +36,14 @@ impl VoxelClass {
         Self::NotSeenAfter,
         Self::UncertainAppeared,
         Self::UncertainVanished,
+        Self::HiddenBefore,
+        Self::HiddenAfter,
     ];
+
+    /// Returns whether voxels of the class are occupied in the earlier map, and not in the later one.
+    pub fn is_of_earlier(self) -> bool {
+        matches!(self, Self::Vanished | Self::NotSeenAfter | Self::UncertainVanished | Self::HiddenAfter)
+    }
 
     /// Name in files and JSON.
     pub fn name(self) -> &'static str {
@@ -44,6 +55,8 @@ impl VoxelClass {
             Self::NotSeenAfter => "not_seen_after",
             Self::UncertainAppeared => "uncertain_appeared",
             Self::UncertainVanished => "uncertain_vanished",
+            Self::HiddenBefore => "hidden_before",
+            Self::HiddenAfter => "hidden_after",
         }
     }
 }

@@ -369,7 +369,7 @@ fn classes_of_a_comparison_hide_each_other_in_order() {
     use voxtile::space::VoxelBox;
     use voxtile_compare::VoxelClass;
     let config = MapConfig::new(RESOLUTION_M, 4.0).unwrap();
-    let voxels = VoxelBox { min: [-2, 0, -1], end: [6, 4, 9] };
+    let voxels = VoxelBox { min: [-2, 0, -1], end: [8, 4, 9] };
     let picture = plain();
     let mut drawing = picture.start_comparison(&config, voxels).unwrap();
     // A column with each class on top of those before, from the highest to the lowest voxel.
@@ -379,11 +379,11 @@ fn classes_of_a_comparison_hide_each_other_in_order() {
     }
     drawing.add_compared([0, 1, 3], VoxelClass::Appeared, false);
     drawing.add_compared([0, 1, 2], VoxelClass::Vanished, true);
-    drawing.add_compared([6, 1, 0], VoxelClass::Vanished, false);
+    drawing.add_compared([8, 1, 0], VoxelClass::Vanished, false);
     drawing.add_box(Aabb { min: [-1.0, 0.5, 0.0], max: [9.0, 1.0, 0.5] }, "1");
     let drawn = drawing.finish();
     let of = |class| colors::comparison_color(class);
-    let row: Vec<[u8; 3]> = (0..7).map(|across| cell(&drawn, [across, 0])).collect();
+    let row: Vec<[u8; 3]> = (0..9).map(|across| cell(&drawn, [across, 0])).collect();
     let mut wanted = VoxelClass::ALL.map(of);
     wanted[2] = of(VoxelClass::Vanished);
     assert_eq!(row, wanted);

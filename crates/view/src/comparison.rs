@@ -8,9 +8,9 @@ use std::path::Path;
 use voxtile::Result;
 use voxtile::mapper::MapView;
 use voxtile_compare::{CompareOptions, Comparison, VoxelClass, compare, for_each_voxel};
-use voxtile_pipeline::{check_crs, open_any_map, warnings_of};
+use voxtile_pipeline::{check_crs, open_any_map, viewpoints_of, warnings_of};
 use voxtile_render::levels::{
-    ComparedLevels, ComparedLevelsBuilder, Kind, TilesetContent, TilesetNodes, subtree, tileset,
+    ComparedLevels, ComparedLevelsBuilder, Kind, TilesetContent, TilesetNodes, class_bit, subtree, tileset,
 };
 
 /// Comparison of the first map with the second, as they were when the server started.
@@ -38,6 +38,8 @@ impl ServedComparison {
         let warnings = warnings_of(maps);
         warnings.iter().for_each(|warning| log::warn!("{warning}"));
         let step = |done, all| progress(done, all);
+        let viewpoints = [viewpoints_of(&before, None)?, viewpoints_of(&after, None)?];
+        let options = &options.clone().with_viewpoints(viewpoints);
         let comparison = compare(&before, &after, options, &step)?;
         let mut builder = ComparedLevelsBuilder::new(after.config().grid, node_cache::temporary()?);
         let classes = &VoxelClass::ALL;
@@ -49,19 +51,21 @@ impl ServedComparison {
     /// Returns the description in `maps.json`. The maps are the first and the second one.
     pub fn describe(&self) -> Value {
         let Comparison { before, after, .. } = &self.comparison;
-        let classes = VoxelClass::ALL.into_iter().map(|class| {
-            let voxels = match class {
-                VoxelClass::Unchanged => after.unchanged,
-                VoxelClass::Appeared => after.changed,
-                VoxelClass::Vanished => before.changed,
-                VoxelClass::NotSeenBefore => after.not_seen,
-                VoxelClass::NotSeenAfter => before.not_seen,
-                VoxelClass::UncertainAppeared => after.uncertain,
-                VoxelClass::UncertainVanished => before.uncertain,
-            };
-            json!({ "name": class.name(), "voxels": voxels })
-        });
-        let classes: Vec<Value> = classes.collect();
+        // By their bits in the nodes; those of hidden voxels of both maps are one.
+        let mut classes: Vec<(&str, u64)> = Vec::new();
+        for class in VoxelClass::ALL {
+            let voxels = self.comparison.voxels_of(class);
+            match classes.get_mut(usize::from(class_bit(class))) {
+                Some((_, all)) => *all += voxels,
+                None if class == VoxelClass::HiddenBefore => classes.push(("hidden", voxels)),
+                None => classes.push((class.name(), voxels)),
+            }
+        }
+        if before.hidden.or(after.hidden).is_none() {
+            classes.retain(|(name, _)| *name != "hidden");
+        }
+        let classes: Vec<Value> =
+            classes.into_iter().map(|(name, voxels)| json!({ "name": name, "voxels": voxels })).collect();
         json!({ "before": 0, "after": 1, "classes": classes, "warnings": self.warnings })
     }
 

@@ -381,6 +381,7 @@ def compare(
     certainty: float = 0.7,
     min_voxels: int = 8,
     region: ArrayLike | None = None,
+    positions: tuple[ArrayLike | None, ArrayLike | None] = (None, None),
     memory: int | str | None = None,
     progress: _Progress | None = None,
 ) -> Comparison: ...

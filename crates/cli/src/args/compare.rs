@@ -23,6 +23,13 @@ pub struct CompareArgs {
     pub certainty: f64,
     #[arg(long, value_names = ["X0", "Y0", "Z0", "X1", "Y1", "Z1"], num_args = 6, help = help::VOXELS_IN_BOX)]
     pub region: Option<Vec<f64>>,
+    /// Poses of the earlier map's sensor, in the map's frame: of what this map has not seen, the voxels that something
+    /// was in front of count as hidden [default: poses of the scans that the map keeps]
+    #[arg(long, value_name = "FILE")]
+    pub poses_before: Option<PathBuf>,
+    /// The same for the later map
+    #[arg(long, value_name = "FILE")]
+    pub poses_after: Option<PathBuf>,
     /// Also write the list of changes: .csv .json .geojson
     #[arg(long, value_name = "FILE")]
     pub list: Option<PathBuf>,
@@ -31,7 +38,7 @@ pub struct CompareArgs {
     #[arg(short = 'o', long = "output", value_name = "FILE")]
     pub output: Option<PathBuf>,
     /// With -o: all occupied voxels of both maps, also 64 unchanged, 67 not seen before, 68 not seen after, 69 and 70
-    /// uncertain
+    /// uncertain, 71 and 72 hidden
     #[arg(long, requires = "output")]
     pub all: bool,
     /// Also write a report as one HTML file: counts, a picture from above, and the largest changes with pictures

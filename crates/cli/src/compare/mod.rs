@@ -24,8 +24,8 @@ use voxtile::{Error, Result};
 use voxtile_compare::{Clusters, CompareOptions, Comparison, EpochCounts, compare};
 use voxtile_pipeline::output::{OutputFile, is_standard_output};
 use voxtile_pipeline::{
-    AnyMap, ListFormat, WhichChanges, changes_format, check_crs, memory, read_any_maps, warnings_of,
-    write_change_list, write_changed_voxels,
+    AnyMap, ListFormat, WhichChanges, changes_format, check_crs, memory, read_any_maps, viewpoints_of,
+    warnings_of, write_change_list, write_changed_voxels,
 };
 
 /// Number of changes in the summary for people.
@@ -71,6 +71,10 @@ pub fn run(args: &CompareArgs) -> anyhow::Result<ExitCode> {
         .with_memory(usize::try_from(args.memory.as_u64()).unwrap_or(usize::MAX))
         .with_stop(stop);
     let mut report = read_any_maps(&args.before, &args.after, |before, after| {
+        let options = options.clone().with_viewpoints([
+            viewpoints_of(before, args.poses_before.as_deref())?,
+            viewpoints_of(after, args.poses_after.as_deref())?,
+        ]);
         let report = report(args, &options, [(&args.before, before), (&args.after, after)])?;
         if let Some(file) = &mut page {
             write_page(&report, args, &options, [before, after], file)?;
@@ -177,20 +181,26 @@ impl Report {
         let tolerance_m = f64::from(comparison.tolerance_voxels) * self.resolution_m;
         writeln!(out, "tolerance {tolerance} ({tolerance_m:.3} m)\n")?;
         writeln!(out, "{:<10} {:>19} {:>19}", "occupied", "before", "after")?;
-        type Count = fn(&EpochCounts) -> u64;
-        let rows: [(&str, Count); 5] = [
-            ("all", |counts| counts.occupied),
-            ("unchanged", |counts| counts.unchanged),
-            ("changed", |counts| counts.changed),
-            ("uncertain", |counts| counts.uncertain),
-            ("not seen", |counts| counts.not_seen),
+        type Count = fn(&EpochCounts) -> Option<u64>;
+        let rows: [(&str, Count); 6] = [
+            ("all", |counts| Some(counts.occupied)),
+            ("unchanged", |counts| Some(counts.unchanged)),
+            ("changed", |counts| Some(counts.changed)),
+            ("uncertain", |counts| Some(counts.uncertain)),
+            ("not seen", |counts| Some(counts.not_seen)),
+            ("  hidden", |counts| counts.hidden),
         ];
         for (name, count) in rows {
-            let [before, after] = [&comparison.before, &comparison.after].map(|counts| {
-                let voxels = HumanCount(count(counts)).to_string();
-                format!("{voxels:>11} {:>5.1} %", percent(count(counts), counts))
+            let both = [&comparison.before, &comparison.after];
+            let [before, after] = both.map(|counts| match count(counts) {
+                Some(voxels) => {
+                    format!("{:>11} {:>5.1} %", HumanCount(voxels).to_string(), percent(voxels, counts))
+                }
+                None => format!("{:>19}", "unknown"),
             });
-            writeln!(out, "{name:<10} {before} {after}")?;
+            if both.into_iter().any(|counts| count(counts).is_some()) {
+                writeln!(out, "{name:<10} {before} {after}")?;
+            }
         }
         writeln!(out)?;
         print_clusters("vanished", &comparison.vanished, out)?;

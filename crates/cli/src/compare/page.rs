@@ -92,19 +92,28 @@ impl Page<'_> {
         let (before, after) = ((&comparison.before, "earlier map"), (&comparison.after, "later map"));
         type Count = fn(&EpochCounts) -> u64;
         let (unchanged, changed): (Count, Count) = (|counts| counts.unchanged, |counts| counts.changed);
-        let (not_seen, uncertain): (Count, Count) = (|counts| counts.not_seen, |counts| counts.uncertain);
+        let (not_seen, uncertain): (Count, Count) =
+            (|counts| counts.not_seen - counts.hidden.unwrap_or(0), |counts| counts.uncertain);
+        let hidden: Count = |counts| counts.hidden.unwrap_or(0);
         let [occupied, free] = ["has an occupied voxel within the tolerance", "has seen the place free"];
         let [unknown, unclear] = ["has not observed the place", "has perhaps seen the place free"];
+        let behind = "had something in front of the place";
         for (class, (counts, map), other, count) in [
             (VoxelClass::Appeared, after, free, changed),
             (VoxelClass::Vanished, before, free, changed),
             (VoxelClass::UncertainAppeared, after, unclear, uncertain),
             (VoxelClass::UncertainVanished, before, unclear, uncertain),
+            (VoxelClass::HiddenBefore, after, behind, hidden),
+            (VoxelClass::HiddenAfter, before, behind, hidden),
             (VoxelClass::NotSeenBefore, after, unknown, not_seen),
             (VoxelClass::NotSeenAfter, before, unknown, not_seen),
             (VoxelClass::Unchanged, after, occupied, unchanged),
             (VoxelClass::Unchanged, before, occupied, unchanged),
         ] {
+            let is_hidden = matches!(class, VoxelClass::HiddenBefore | VoxelClass::HiddenAfter);
+            if is_hidden && counts.hidden.is_none() {
+                continue;
+            }
             let (square, voxels) = (swatch(colors::comparison_color(class)), count(counts));
             write!(
                 out,

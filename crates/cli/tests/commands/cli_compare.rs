@@ -153,6 +153,46 @@ fn doubtful_and_unsuitable_maps_are_named() {
 }
 
 #[test]
+fn hidden_voxels_are_told_from_those_out_of_view() {
+    let folder = TempDir::new().unwrap();
+    let path = |name: &str| folder.path().join(name);
+    let far = wall_at(folder.path(), "far", 4.05, 0.1, None);
+    let near = wall_at(folder.path(), "near", 2.05, 0.1, None);
+    let (poses, page, csv) = (path("poses.txt"), path("page.html"), path("all.csv"));
+    fs::write(&poses, "1 0 0 0 0 1 0 0 0 0 1 0\n").unwrap();
+    let run = |more: &[&str]| json(&[&["compare", text(&far), text(&near), "--json"][..], more].concat());
+    let counts = |found: &serde_json::Value| {
+        [&found["before"]["not_seen"], &found["before"]["hidden"], &found["after"]["hidden"]]
+            .map(Clone::clone)
+    };
+    let unknown = serde_json::Value::Null;
+    assert_eq!(counts(&run(&[])), [25.into(), unknown.clone(), unknown.clone()]);
+    // The near wall was in front of the far one.
+    let files = ["--report", text(&page), "-o", text(&csv), "--all"];
+    let found = run(&[&["--poses-after", text(&poses)][..], &files].concat());
+    assert_eq!(counts(&found), [25.into(), 25.into(), unknown]);
+    assert!(fs::read_to_string(&csv).unwrap().lines().filter(|line| line.contains(",72")).count() == 25);
+    let page = fs::read_to_string(&page).unwrap();
+    let row = "hidden after</td><td>earlier map</td><td>had something in front of the place</td><td class=\"number\">25<";
+    assert!(page.contains(row) && !page.contains("hidden before"), "{page}");
+    let summary = output(&["compare", text(&far), text(&near), "--poses-after", text(&poses)]);
+    assert!(summary.contains("  hidden            25 100.0 %             unknown"), "{summary}");
+    // From the side, nothing was.
+    fs::write(&poses, "1 0 0 3.05 0 1 0 0 0 0 1 0\n").unwrap();
+    assert_eq!(run(&["--poses-after", text(&poses)])["before"]["hidden"], 0);
+    fs::write(&poses, "").unwrap();
+    let (code, message) = failure(&["compare", text(&far), text(&near), "--poses-after", text(&poses)]);
+    assert!(code == 2 && message.contains("poses.txt: contains no pose"), "{message}");
+    // Positions of kept scans.
+    let input = scans(&folder);
+    for (map, more) in [("kept", "--keep-scans"), ("other", "--keep-scans")] {
+        output(&["build", text(&input), "-o", text(&path(map)), more]);
+    }
+    let found = json(&["compare", text(&path("kept")), text(&path("other")), "--json"]);
+    assert!(found["before"]["hidden"] == 0 && found["after"]["hidden"] == 0, "{found}");
+}
+
+#[test]
 fn frontiers_are_listed() {
     let folder = TempDir::new().unwrap();
     let map = wall_at(folder.path(), "map", 2.05, 0.1, None);

@@ -4,7 +4,7 @@ use testkit::support::cases;
 use voxtile::nalgebra::{Isometry3, Translation3, UnitQuaternion};
 use voxtile::scan::Pose;
 use voxtile::{Aabb, Clearing, InMemoryMapper, MapConfig, Mapper, Point, Scan};
-use voxtile_compare::{Change, ChangeKind, CompareOptions, Comparison, compare};
+use voxtile_compare::{Change, ChangeKind, CompareOptions, Comparison, Viewpoints, compare};
 use voxtile_simulation::{Lidar, Random, Scene, Solid, World};
 
 pub const RESOLUTION_M: f64 = 0.1;
@@ -213,10 +213,15 @@ fn walls_doors_and_cars_are_found_and_nothing_changes_behind_a_screen() {
         score.add(&setting, &comparison, drift_m + RESOLUTION_M);
         println!("{score:?} {:?} {:?} {:?}", comparison.before, comparison.after, comparison.changes);
         assert!(score.precision() == 1.0 && score.recall() == 1.0, "{score:?}");
-        // The boxes are hidden now.
+        // The boxes are hidden now: something is in front of them wherever the sensor was.
         let region = Aabb { min: [6.0, 7.4, 0.3], max: [9.0, 9.0, 2.0] };
-        let hidden = compare(&before, &after, &options.with_region(region), &|_, _| {}).unwrap();
+        let empty = Hall(Vec::new());
+        let positions = walk(&empty, 1, drift_m).map(|scan| scan.origin);
+        let viewpoints = Viewpoints::new(positions, None).unwrap();
+        let options = options.with_region(region).with_viewpoints([None, Some(viewpoints)]);
+        let hidden = compare(&before, &after, &options, &|_, _| {}).unwrap();
         assert!(hidden.changes.is_empty() && hidden.before.not_seen > 200, "{hidden:?}");
         assert_eq!(hidden.before.changed, 0, "{hidden:?}");
+        assert_eq!((hidden.before.hidden, hidden.after.hidden), (Some(hidden.before.not_seen), None));
     }
 }

@@ -1,4 +1,4 @@
-use crate::naive::{bounds_m, classes, clusters, is_same_box, voxels_of};
+use crate::naive::{Positions, bounds_m, classes, clusters, is_hidden, is_same_box, thinned, voxels_of};
 use crate::random_maps::{TILE_SIZES_M, config, fill, random_map, random_region, storage_of};
 use std::collections::{BTreeMap, BTreeSet};
 use testkit::random_scans::Random;
@@ -6,7 +6,7 @@ use testkit::support::cases;
 use voxtile::mapper::MapView;
 use voxtile::{MapOptions, MapReader, Mapper, VoxelIndex};
 use voxtile_compare::{
-    ChangeKind, CompareOptions, Comparison, EpochCounts, VoxelClass, compare, for_each_voxel,
+    ChangeKind, CompareOptions, Comparison, EpochCounts, Viewpoints, VoxelClass, compare, for_each_voxel,
 };
 
 type Classes = BTreeMap<VoxelIndex, VoxelClass>;
@@ -49,8 +49,13 @@ const OF_BEFORE: [VoxelClass; 3] =
 const OF_AFTER: [VoxelClass; 3] =
     [VoxelClass::Appeared, VoxelClass::NotSeenBefore, VoxelClass::UncertainAppeared];
 
-/// Compares two maps with the definition.
-fn check<A: MapView, B: MapView>(a: &A, b: &B, options: &CompareOptions, name: &str) -> usize {
+/// Compares two maps with the definition. Returns the numbers of changes and of hidden voxels.
+fn check<A: MapView, B: MapView>(
+    a: &A,
+    b: &B,
+    (options, positions): &(CompareOptions, [Option<Positions>; 2]),
+    name: &str,
+) -> [usize; 2] {
     let (comparison, found, changes) = compared(a, b, options);
     let (before, after) = (voxels_of(a), voxels_of(b));
     let tolerance = options.tolerance_m.map_or(1, |tolerance_m| (tolerance_m / 0.1).round() as i32);
@@ -66,7 +71,21 @@ fn check<A: MapView, B: MapView>(a: &A, b: &B, options: &CompareOptions, name: &
     wanted.extend(
         of_before.iter().filter(|(_, class)| **class != VoxelClass::Unchanged).map(|(k, v)| (*k, *v)),
     );
+    // Unknown voxels are hidden or out of view.
+    for (voxel, class) in &mut wanted {
+        let is_known_hidden = match (&*class, positions) {
+            (VoxelClass::NotSeenBefore, [Some(positions), _]) => is_hidden(a, positions, *voxel),
+            (VoxelClass::NotSeenAfter, [_, Some(positions)]) => is_hidden(b, positions, *voxel),
+            _ => false,
+        };
+        if is_known_hidden {
+            let is_before = *class == VoxelClass::NotSeenBefore;
+            *class = if is_before { VoxelClass::HiddenBefore } else { VoxelClass::HiddenAfter };
+        }
+    }
     assert_eq!(found, wanted, "{name}");
+    let hidden = [comparison.after.hidden, comparison.before.hidden].map(|hidden| hidden.is_some());
+    assert_eq!(hidden, positions.each_ref().map(Option::is_some), "{name}");
     for class in VoxelClass::ALL {
         let count = found.values().filter(|other| **other == class).count() as u64;
         assert_eq!(comparison.voxels_of(class), count, "{name}: {class:?}");
@@ -100,10 +119,25 @@ fn check<A: MapView, B: MapView>(a: &A, b: &B, options: &CompareOptions, name: &
         };
         assert!((0..3).all(|k| (change.center_m[k] - mean(k)).abs() < 1e-6));
     }
-    comparison.changes.len()
+    let is_hidden = |class: &&VoxelClass| matches!(class, VoxelClass::HiddenBefore | VoxelClass::HiddenAfter);
+    [comparison.changes.len(), found.values().filter(is_hidden).count()]
 }
 
-fn random_options(random: &mut Random) -> CompareOptions {
+fn random_options(random: &mut Random) -> (CompareOptions, [Option<Positions>; 2]) {
+    let settings = random_settings(random);
+    let positions: [Option<Positions>; 2] = std::array::from_fn(|_| {
+        let count = [1, 2, 30][random.below(3) as usize];
+        let positions = (0..count).map(|_| random.point([0.3, 12.4, -0.2], 2.0)).collect();
+        let range_m = [0.5, 2.0, 20.0][random.below(3) as usize];
+        (random.below(3) > 0).then_some((positions, range_m))
+    });
+    let viewpoints = positions.clone().map(|positions| {
+        positions.map(|(positions, range_m)| Viewpoints::new(positions, Some(range_m)).unwrap())
+    });
+    (settings.with_viewpoints(viewpoints), positions.map(|positions| positions.map(thinned)))
+}
+
+fn random_settings(random: &mut Random) -> CompareOptions {
     let tolerances_m = [None, Some(0.0), Some(0.1), Some(0.2), Some(0.34)];
     CompareOptions::default()
         .with_tolerance(tolerances_m[random.below(5) as usize])
@@ -122,9 +156,22 @@ fn comparisons_of_random_maps_equal_the_definition() {
         let (a, b) = (random_map(case, 1, tile_size_m(random)), random_map(case, 2, tile_size_m(random)));
         let options = random_options(random);
         let pool = rayon::ThreadPoolBuilder::new().num_threads(1 + random.below(3) as usize).build().unwrap();
-        changes += pool.install(|| check(&a, &b, &options, &format!("case {case}: {options:?}")));
+        changes += pool.install(|| check(&a, &b, &options, &format!("case {case}")))[0];
     }
     assert!(changes > 20, "{changes}");
+}
+
+#[test]
+fn hidden_voxels_of_different_scenes_equal_the_definition() {
+    let mut hidden = 0;
+    for case in 0..cases(10, 300) {
+        let random = &mut Random(case);
+        let (a, b) =
+            (random_map(case, 1, 3.0), random_map(case + 500, 2, TILE_SIZES_M[random.below(3) as usize]));
+        let options = random_options(random);
+        hidden += check(&a, &b, &options, &format!("case {case}"))[1];
+    }
+    assert!(hidden > 20, "{hidden}");
 }
 
 #[test]
@@ -142,10 +189,10 @@ fn maps_on_disk_of_both_storages_equal_maps_in_memory() {
             MapReader::open(&path, 1 << 20).unwrap()
         });
         let options = random_options(random);
-        check(&a, &b, &options, &format!("case {case}: {options:?}"));
+        check(&a, &b, &options, &format!("case {case}"));
         let in_memory = [1, 2].map(|epoch| random_map(case, epoch, 3.0));
-        let of_disk = compared(&a, &b, &options);
-        let of_memory = compared(&in_memory[0], &in_memory[1], &options);
+        let of_disk = compared(&a, &b, &options.0);
+        let of_memory = compared(&in_memory[0], &in_memory[1], &options.0);
         assert_eq!(
             (of_disk.0.changes, of_disk.1, of_disk.2),
             (of_memory.0.changes, of_memory.1, of_memory.2)

@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 use voxtile::mapper::MapView;
-use voxtile::{Aabb, VoxelIndex};
+use voxtile::{Aabb, Point, Queries, UnknownAs, VoxelIndex};
 use voxtile_compare::VoxelClass;
 
 /// Observed voxels with their log-odds.
@@ -29,6 +29,38 @@ pub fn neighbors(voxel: VoxelIndex) -> [VoxelIndex; 6] {
         near[k / 2] += if k % 2 == 0 { 1 } else { -1 };
         near
     })
+}
+
+/// Positions of a sensor, and its range in metres.
+pub type Positions = (Vec<Point>, f64);
+
+/// Of the positions in each cube of a twentieth of the range, the lowest.
+pub fn thinned((positions, range_m): Positions) -> Positions {
+    let mut kept = BTreeMap::<[i64; 3], Point>::new();
+    for position in positions {
+        let own = kept.entry(position.map(|k| (k / (range_m / 20.0)).floor() as i64)).or_insert(position);
+        if position < *own {
+            *own = position;
+        }
+    }
+    (kept.into_values().collect(), range_m)
+}
+
+/// Whether from each of the 16 nearest positions in range something is in front of a voxel of a map.
+pub fn is_hidden(map: &impl MapView, (positions, range_m): &Positions, voxel: VoxelIndex) -> bool {
+    let grid = map.config().grid;
+    let center_m = grid.center_m(voxel);
+    let distance_m =
+        |position: &Point| (0..3).map(|k| (position[k] - center_m[k]).powi(2)).sum::<f64>().sqrt();
+    let mut near: Vec<&Point> =
+        positions.iter().filter(|position| distance_m(position) <= *range_m).collect();
+    near.sort_by(|a, b| distance_m(a).total_cmp(&distance_m(b)));
+    near.truncate(16);
+    let is_blocked = |position: &&Point| {
+        let hit = map.cast_segment(center_m, **position, UnknownAs::Free).unwrap();
+        hit.is_some_and(|hit| Some(hit.voxel) != grid.voxel_of(**position))
+    };
+    !near.is_empty() && near.iter().all(is_blocked)
 }
 
 /// Classes of the occupied voxels of `own`; `names` are those of a change, not seen, uncertain.

@@ -2,7 +2,7 @@ use crate::random_maps::random_map;
 use testkit::support::message_of;
 use voxtile::scan::{PointBatch, Stop};
 use voxtile::{Aabb, Error, InMemoryMapper, MapConfig, Mapper};
-use voxtile_compare::{CompareOptions, FrontierOptions, compare, frontiers};
+use voxtile_compare::{CompareOptions, FrontierOptions, Viewpoints, compare, frontiers};
 
 #[test]
 fn invalid_arguments_are_refused() {
@@ -15,6 +15,10 @@ fn invalid_arguments_are_refused() {
     for certainty in [0.5, 1.0, f64::NAN, -3.0] {
         let message = message_of(with(CompareOptions::default().with_certainty(certainty)));
         assert!(message.contains("above 0.5 and below 1"), "{message}");
+    }
+    for range_m in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+        let message = message_of(Viewpoints::new([], Some(range_m)));
+        assert!(message.contains("a length above 0 m"), "{message}");
     }
     let coarse = InMemoryMapper::new(MapConfig::new(0.2, 10.0).unwrap()).unwrap();
     let message = message_of(compare(&map, &coarse, &CompareOptions::default(), &|_, _| {}));
@@ -43,6 +47,11 @@ fn empty_maps_boxes_without_voxels_and_the_ends_of_space_are_valid() {
         let all = compare(&map, &map, &CompareOptions::default().with_tolerance(1.6), &|_, _| {}).unwrap();
         assert_eq!((all.before.unchanged, all.before.occupied), (1, 1), "{end_m}");
         frontiers(&map, &FrontierOptions::default(), &|_, _| {}).unwrap();
+        let positions = [[end_m; 3], [end_m, 0.0, 1e300], [f64::NAN; 3], [end_m * (1.0 - 1e-8); 3]];
+        let viewpoints = [Some(1e9), Some(10.0)].map(|range_m| Viewpoints::new(positions, range_m).ok());
+        let options = CompareOptions::default().with_viewpoints(viewpoints);
+        let hidden = compare(&map, &empty(), &options, &|_, _| {}).unwrap().before;
+        assert_eq!((hidden.not_seen, hidden.hidden), (1, Some(0)), "{end_m}");
     }
 }
 

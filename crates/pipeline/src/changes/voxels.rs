@@ -31,6 +31,8 @@ fn colour(class: VoxelClass) -> [u8; 3] {
         VoxelClass::NotSeenAfter => [31, 119, 180],
         VoxelClass::UncertainAppeared => [199, 233, 160],
         VoxelClass::UncertainVanished => [253, 174, 107],
+        VoxelClass::HiddenBefore => [188, 189, 220],
+        VoxelClass::HiddenAfter => [117, 107, 177],
     }
 }
 
@@ -98,9 +100,7 @@ pub fn write_changed_voxels<A: MapView, B: MapView>(
         if which == WhichChanges::Listed && change.is_none() {
             return Ok(());
         }
-        let is_of_before =
-            matches!(class, VoxelClass::Vanished | VoxelClass::NotSeenAfter | VoxelClass::UncertainVanished);
-        let evidence = if is_of_before { before.evidence(index)? } else { after.evidence(index)? };
+        let evidence = if class.is_of_earlier() { before.evidence(index)? } else { after.evidence(index)? };
         sink.put(&VoxelRow {
             index,
             center_m: grid.center_m(index),

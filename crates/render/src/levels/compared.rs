@@ -14,8 +14,8 @@ use voxtile_compare::VoxelClass;
 /// Voxels along the edge of a node, at any level.
 const EDGE: i32 = 128;
 
-/// Levels of the voxels of a comparison. The value of a voxel is the set of its classes: bit 0 is the first of
-/// [`VoxelClass::ALL`]. A coarse voxel has those of all voxels in it.
+/// Levels of the voxels of a comparison. The value of a voxel is the set of its classes, each a [bit](class_bit). A coarse
+/// voxel has those of all voxels in it.
 #[derive(Debug)]
 pub struct ComparedLevels {
     grid: Grid,
@@ -56,7 +56,7 @@ impl ComparedLevelsBuilder {
             }
         }
         let at = voxel.map(|k| i64::from(k.rem_euclid(EDGE)));
-        let cell = Cell { place: place(at), value: 1 << (class as u8), count: 0 };
+        let cell = Cell { place: place(at), value: 1 << class_bit(class), count: 0 };
         self.current.get_or_insert_with(|| (key, Vec::new())).1.push(cell);
         Ok(())
     }
@@ -151,6 +151,11 @@ impl ComparedLevels {
             threshold: 0.0,
         }
     }
+}
+
+/// Bit of a class in [`ComparedLevels`], by its position in [`VoxelClass::ALL`]. Hidden voxels of both maps have the last.
+pub fn class_bit(class: VoxelClass) -> u8 {
+    (class as u8).min(VoxelClass::HiddenBefore as u8)
 }
 
 /// Sorts cells and merges those of one position, with the classes of all of them.

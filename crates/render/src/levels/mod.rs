@@ -38,7 +38,7 @@ mod layer_tests;
 mod tests;
 
 pub use cells::Kind;
-pub use compared::{ComparedLevels, ComparedLevelsBuilder};
+pub use compared::{ComparedLevels, ComparedLevelsBuilder, class_bit};
 pub use difference::Difference;
 pub use layer_totals::LayerTotals;
 pub use levels_layers::ColouredVoxel;

@@ -12,8 +12,10 @@ use voxtile::{MapConfig, Result};
 use voxtile_compare::VoxelClass;
 
 /// The classes of a comparison; a later one hides an earlier one.
-pub(super) const CLASSES: [VoxelClass; 7] = [
+pub(super) const CLASSES: [VoxelClass; 9] = [
     VoxelClass::Unchanged,
+    VoxelClass::HiddenBefore,
+    VoxelClass::HiddenAfter,
     VoxelClass::NotSeenBefore,
     VoxelClass::NotSeenAfter,
     VoxelClass::UncertainAppeared,
@@ -35,6 +37,7 @@ pub fn comparison_color(class: VoxelClass) -> Rgb {
         VoxelClass::Appeared => palette::APPEARED,
         VoxelClass::Vanished => palette::VANISHED,
         VoxelClass::NotSeenBefore | VoxelClass::NotSeenAfter => palette::NOT_SEEN,
+        VoxelClass::HiddenBefore | VoxelClass::HiddenAfter => palette::HIDDEN,
         VoxelClass::UncertainAppeared | VoxelClass::UncertainVanished => palette::UNCERTAIN,
     }
 }
@@ -50,6 +53,7 @@ pub(super) fn legend_entries() -> Vec<Entry> {
         (palette::VANISHED, "vanished"),
         (palette::UNCERTAIN, "uncertain"),
         (palette::NOT_SEEN, "not seen in one map"),
+        (palette::HIDDEN, "hidden in one map"),
         (palette::UNCHANGED, "unchanged"),
     ];
     colors.map(|(color, label)| Entry { color: Some(color), label: label.to_owned() }).into()

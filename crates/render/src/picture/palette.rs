@@ -28,6 +28,8 @@ pub const APPEARED: Rgb = [74, 144, 255];
 pub const UNCHANGED: Rgb = [74, 82, 96];
 /// In a comparison, occupied in one map and unknown in the other.
 pub const NOT_SEEN: Rgb = [158, 162, 170];
+/// In a comparison, occupied in one map and hidden from the sensor of the other.
+pub const HIDDEN: Rgb = [156, 216, 252];
 /// In a comparison, occupied in one map and perhaps free in the other.
 pub const UNCERTAIN: Rgb = [255, 240, 178];
 
@@ -189,7 +191,7 @@ mod tests {
     fn classes_of_a_comparison_are_distinct_with_color_blindness() {
         // The limits of relief shading, which only unchanged voxels have.
         let unchanged = [0.72, 1.0, 1.22].map(|light| lit(UNCHANGED, light));
-        let others = [UNKNOWN, NOT_SEEN, UNCERTAIN, VANISHED, APPEARED];
+        let others = [UNKNOWN, NOT_SEEN, HIDDEN, UNCERTAIN, VANISHED, APPEARED];
         for (number, color) in others.into_iter().enumerate() {
             for other in others[..number].iter().copied().chain(unchanged) {
                 for sight in &SIGHTS {

@@ -20,7 +20,7 @@ function scans(work, name, boxes) {
 // Tests the view of the changes between two maps.
 export async function checkChanges({ browser, view, run, exported, countPixels, work }) {
   const [before, after] = [join(work, 'earlier'), join(work, 'later')];
-  const options = ['--resolution', '0.1', '--clearing', 'guarded', '-q'];
+  const options = ['--resolution', '0.1', '--clearing', 'guarded', '--keep-scans', '-q'];
   run('build', ...scans(work, 'scans-before', [[-1.5, -0.7]]), '-o', before, ...options);
   run('build', ...scans(work, 'scans-after', [[-0.2, 1.2]]), '-o', after, ...options);
   const wanted = JSON.parse(run('compare', before, after, '--json'));
@@ -33,8 +33,10 @@ export async function checkChanges({ browser, view, run, exported, countPixels, 
     await browser.until(`document.getElementById('state').textContent === 'ready' && voxtile.voxels().edges.join() === '0.1' && voxtile.voxels().count === ${count}`, 30);
   };
   const all = { unchanged: wanted.after.unchanged, appeared: wanted.after.changed, vanished: wanted.before.changed,
-    not_seen_before: wanted.after.not_seen, not_seen_after: wanted.before.not_seen,
-    uncertain_appeared: wanted.after.uncertain, uncertain_vanished: wanted.before.uncertain };
+    not_seen_before: wanted.after.not_seen - wanted.after.hidden, not_seen_after: wanted.before.not_seen - wanted.before.hidden,
+    uncertain_appeared: wanted.after.uncertain, uncertain_vanished: wanted.before.uncertain, hidden: wanted.after.hidden + wanted.before.hidden };
+  // The wall behind the boxes.
+  assert.ok(all.hidden > 100, `${all.hidden} hidden voxels`);
   const sum = Object.values(all).reduce((one, other) => one + other, 0);
   await voxels(sum);
   // The legend counts the classes, and hides them.
@@ -49,7 +51,7 @@ export async function checkChanges({ browser, view, run, exported, countPixels, 
   await toggle('appeared');
   await voxels(sum - all.appeared);
   assert.equal(await near(0, 98, 179), 0, 'appeared voxels are hidden');
-  await toggle('appeared', 'unchanged', 'not_seen_before', 'not_seen_after', 'uncertain_appeared', 'uncertain_vanished');
+  await toggle('appeared', 'unchanged', 'not_seen_before', 'not_seen_after', 'uncertain_appeared', 'uncertain_vanished', 'hidden');
   await voxels(all.appeared + all.vanished);
   // The buttons fly to one change after another, from the largest on.
   const target = async () => (await browser.value('voxtile.camera()')).to;

@@ -14,7 +14,7 @@ uniform vec2 range;
 uniform float lastScan;
 uniform int kind;
 uniform int classes;
-uniform vec3 classColours[7];
+uniform vec3 classColours[8];
 varying vec2 corner;
 varying float share;
 varying float light;
@@ -27,9 +27,9 @@ void main() {
   if (kind == 4) {
     int own = int(levels.x + 0.5) & classes;
     isSeen = own != 0 && (int(levels.y + 0.5) & classes) == 0;
-    // Appeared and vanished voxels hide uncertain ones, and these those that one map has not seen, and unchanged ones.
+    // Appeared and vanished voxels hide uncertain ones, and these those that one map has not seen, hidden ones, and unchanged ones.
     classColour = (own & 2) != 0 ? classColours[1] : (own & 4) != 0 ? classColours[2] : (own & 96) != 0 ? classColours[5]
-      : (own & 24) != 0 ? classColours[3] : classColours[0];
+      : (own & 24) != 0 ? classColours[3] : (own & 128) != 0 ? classColours[7] : classColours[0];
   }
   vec3 mid = (modelMatrix * vec4(place.xyz + 0.5, 1.0)).xyz;
   isSeen = isSeen && all(greaterThanEqual(mid, low)) && all(lessThanEqual(mid, high));
@@ -155,5 +155,5 @@ export const sharedUniforms = () => ({
   high: { value: new THREE.Vector3(Infinity, Infinity, Infinity) },
   colourBy: { value: 0 },
   // Classes of a comparison that are shown, as bits.
-  classes: { value: 127 },
+  classes: { value: 255 },
 });

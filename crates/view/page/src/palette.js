@@ -4,8 +4,8 @@ import * as THREE from 'three';
 const STOPS = [[38, 13, 74], [57, 62, 138], [38, 104, 142], [31, 144, 138], [74, 184, 108], [160, 213, 62], [252, 232, 66]];
 // Blue, orange and grey are distinct with colour blindness.
 export const CHANGES = [[0, 114, 208], [230, 126, 0], [150, 154, 162]];
-// Classes of a comparison in the order of the server; no two of these five colours are similar, also with colour blindness.
-export const CLASSES = [[76, 80, 88], [0, 114, 208], [230, 126, 0], [176, 180, 186], [176, 180, 186], [255, 232, 120], [255, 232, 120]];
+// Classes of a comparison in the order of the server; no two of these six colours are similar, also with colour blindness.
+export const CLASSES = [[76, 80, 88], [0, 114, 208], [230, 126, 0], [176, 180, 186], [176, 180, 186], [255, 232, 120], [255, 232, 120], [156, 252, 252]];
 // Points on moving objects, as in pictures of maps: no other colour is similar, also with colour blindness.
 export const MOVING = [190, 18, 24];
 // Obstacles among distances, as in pictures of maps.

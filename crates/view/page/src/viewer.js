@@ -31,7 +31,7 @@ export class Viewer {
     this.shows = { occupied: true, free: false, unknown: false };
     this.threshold = 0;
     // Classes of a comparison that are shown, as bits.
-    this.classes = 127;
+    this.classes = 255;
     this.cut = { low: [-Infinity, -Infinity, -Infinity], high: [Infinity, Infinity, Infinity] };
     this.colour = 'height';
     this.listeners = [];
