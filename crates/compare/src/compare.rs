@@ -149,13 +149,13 @@ impl<'a, A: MapView, B: MapView> Comparer<'a, A, B> {
         [later, earlier].map(|hidden| EpochCounts { hidden, ..EpochCounts::default() })
     }
 
-    /// Whether what the earlier and what the later map has not seen is told apart.
+    /// Whether it is known what was hidden from the sensors of the earlier and of the later map.
     fn is_hidden_known(&self) -> [bool; 2] {
         [0, 1].map(|k| self.options.viewpoints[k].is_some())
     }
 
-    /// Classifies the voxels of all blocks with occupied voxels. Hidden voxels are only told apart if `wanted` has a
-    /// class of them.
+    /// Classifies the voxels of all blocks with occupied voxels. Hidden voxels are only looked for if `wanted` has
+    /// a class of voxels that are not seen.
     pub(crate) fn for_each_block<T: Send>(
         &self,
         wanted: &[VoxelClass],

@@ -15,6 +15,7 @@
 //! frontiers -> frontier_search                    free voxels next to unknown ones, of one map
 //!     -> components -> joined                     the same, clustered
 //!     -> frontier_goals                           a free voxel of each cluster for a robot, in a second pass
+//! observations -> nearest_position             how often and from how far voxels were observed
 //! tops -> volumes                                 highest voxels of columns, and what is between two surfaces
 //! ```
 //!
@@ -34,6 +35,8 @@ mod frontiers;
 mod hidden;
 mod joined;
 mod mask_reader;
+mod nearest_position;
+mod observations;
 mod options;
 mod sets;
 mod sweep;
@@ -48,6 +51,7 @@ mod voxel_class;
 pub use change::{Change, ChangeKind, Clusters, Comparison, EpochCounts};
 pub use compare::compare;
 pub use frontiers::{Coverage, Frontier, FrontierOptions, frontiers, frontiers_in};
+pub use observations::{Class, Observations, observations};
 pub use options::{CompareOptions, MAX_TOLERANCE_VOXELS};
 pub use viewpoints::Viewpoints;
 pub use visit::{ComparedVoxel, for_each_voxel};

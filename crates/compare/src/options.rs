@@ -21,8 +21,8 @@ pub struct CompareOptions {
     pub certainty: f64,
     /// Box in metres: only voxels whose center is inside are compared. Default: all.
     pub region: Option<Aabb>,
-    /// Positions of the sensors of the earlier and the later map, if they are known: what one map has not observed is
-    /// then told apart into hidden and out of view. Default: unknown.
+    /// Positions of the sensors of the earlier and the later map, if they are known: with them, what one map has not
+    /// observed is hidden or out of view. Default: unknown.
     pub viewpoints: [Option<Viewpoints>; 2],
     /// Bytes of memory for tiles, but at least what one block needs. Default: 256 MiB.
     pub memory_bytes: usize,

@@ -2,7 +2,7 @@ use rustc_hash::FxHashMap;
 use std::sync::Arc;
 use voxtile::{Aabb, Error, Point, Result};
 
-/// Positions of a map's sensor. They tell what was hidden from what was out of view.
+/// Positions of a map's sensor, which decide what was hidden and what was out of view.
 ///
 /// Of positions close together, one is kept: each cube of a twentieth of the range keeps the one with the lowest
 /// coordinates. So a long trajectory takes little memory.
@@ -51,7 +51,7 @@ impl Viewpoints {
         self.range_m
     }
 
-    /// Returns the positions that are within the range of a point in a box, and perhaps others near by.
+    /// Returns the positions that are within the range of a point in a box, and perhaps a few others.
     pub(crate) fn near(&self, place_m: &Aabb) -> Vec<Point> {
         let first = cube_of(place_m.min.map(|k| k - self.range_m), self.range_m);
         let last = cube_of(place_m.max.map(|k| k + self.range_m), self.range_m);

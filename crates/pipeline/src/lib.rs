@@ -52,8 +52,9 @@ pub use answer::{Answer, LayersAnswer, answer_at};
 pub use build::build;
 pub use build_options::{BuildOptions, SensorModelKind};
 pub use changes::{
-    ComparedMap, ListFormat, WhichChanges, change_features, changes_format, check_crs, class_code,
-    common_voxels, kept_viewpoints, viewpoints_of, warnings_of, write_change_list, write_changed_voxels,
+    ComparedMap, ListFormat, SensorPositions, WhichChanges, change_features, changes_format, check_crs,
+    class_code, common_voxels, kept_viewpoints, viewpoints_of, warnings_of, write_change_list,
+    write_changed_voxels,
 };
 pub use distance_files::{layer_of, write_distances_npz, write_distances_png};
 pub use export::{

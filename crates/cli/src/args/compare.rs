@@ -57,6 +57,10 @@ pub struct CompareArgs {
 pub struct CoverageArgs {
     #[arg(help = help::ANY_MAP)]
     pub map: PathBuf,
+    /// Poses of the sensor, in the map's frame: occupied voxels are counted by the distance to the nearest position
+    /// [default: poses of the scans that the map keeps]
+    #[arg(long, value_name = "FILE")]
+    pub poses: Option<PathBuf>,
     /// Number of connected voxels from which on a frontier is listed
     #[arg(long, value_name = "N", default_value_t = 8)]
     pub min_voxels: u64,

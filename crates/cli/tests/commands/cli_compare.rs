@@ -204,6 +204,19 @@ fn frontiers_are_listed() {
     assert!(found["frontiers"][0]["area_m2"].as_f64().unwrap() > 0.5, "{found}");
     let summary = output(&["coverage", text(&map)]);
     assert!(summary.contains("observed  25 occupied voxels") && summary.contains("1 frontier,"), "{summary}");
+    // Six scans from the origin hit each voxel.
+    assert!(summary.contains("times     from 1 0.0 %, from 2 0.0 %, from 4 100.0 %\n"), "{summary}");
+    assert!(!summary.contains("distance"), "{summary}");
+    let poses = folder.path().join("poses.txt");
+    fs::write(&poses, "1 0 0 0 0 1 0 0 0 0 1 0\n1 0 0 -9 0 1 0 0 0 0 1 0\n").unwrap();
+    let found = json(&["coverage", text(&map), "--poses", text(&poses), "--json"]);
+    let classes = serde_json::json!(
+        [0.0, 1.0, 2.0]
+            .map(|from| { serde_json::json!({ "from": from, "voxels": if from == 2.0 { 25 } else { 0 } }) })
+    );
+    assert_eq!(found["observations"]["distances_m"], classes, "{found}");
+    let summary = output(&["coverage", text(&map), "--poses", text(&poses)]);
+    assert!(summary.contains("distance  from 0 m 0.0 %, from 1 m 0.0 %, from 2 m 100.0 %\n"), "{summary}");
 }
 
 /// Makes a map of a floor of 2 x 2 m seen from above, with a heap of one square metre.

@@ -5,6 +5,7 @@ mod exact;
 mod frontiers;
 mod frontiers_in;
 mod naive;
+mod observations;
 mod random_maps;
 mod refused;
 mod volumes;

@@ -4,7 +4,7 @@
 //! Comparison -> write_change_list: a row per change      list
 //!            -> write_changed_voxels: a row per voxel    voxels
 //! ComparedMap -> warnings_of: doubts about the result    warnings
-//! AnyMap -> viewpoints_of: positions of its sensor       viewpoints
+//! AnyMap -> SensorPositions, viewpoints_of               viewpoints
 //! ```
 
 mod compared_map;
@@ -15,6 +15,6 @@ mod warnings;
 
 pub use compared_map::ComparedMap;
 pub use list::{ListFormat, change_features, write_change_list};
-pub use viewpoints::{kept_viewpoints, viewpoints_of};
+pub use viewpoints::{SensorPositions, kept_viewpoints, viewpoints_of};
 pub use voxels::{WhichChanges, changes_format, class_code, write_changed_voxels};
 pub use warnings::{check_crs, common_voxels, warnings_of};
