@@ -1,6 +1,6 @@
 //! The simulated epochs as files, for `tools/m3c2/run.sh`.
 
-use crate::epochs::{Setting, large_things, walk};
+use crate::epochs::{SCANS, Setting, large_things, walk};
 use std::fs::{self, File};
 use std::io::{BufWriter, Write};
 use std::path::Path;
@@ -20,7 +20,7 @@ fn epochs_are_written_as_scans() {
     ] {
         let scene = Path::new(&folder).join(name);
         for (epoch, name) in [(0, "before"), (1, "after")] {
-            write_scans(&scene.join(name), walk(&setting.of_epoch(epoch), epoch, 0.0));
+            write_scans(&scene.join(name), walk(&setting.of_epoch(epoch), SCANS, epoch, 0.0));
         }
         let mut things = BufWriter::new(File::create(scene.join("things.csv")).unwrap());
         writeln!(things, "kind,x0,y0,z0,x1,y1,z1").unwrap();
