@@ -8,9 +8,10 @@ use crate::watched::{Progress, watched_with_progress};
 use pyo3::prelude::*;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 use voxtile::integrity::VerifyScope;
 use voxtile::mapper::{MapReader, MapView, OctreeMap};
-use voxtile::operations::{self, AreaPart, Decay, Part, Prefer};
+use voxtile::operations::{self, AreaPart, Decay, MaxAge, Part, Prefer};
 use voxtile::space::Grid;
 use voxtile::{MapPath, MemoryLimit, Result, SnapshotName, Stop, TileIndex, integrity};
 use voxtile_pipeline::{PolygonFile, check_is_no_file, octree_file};
@@ -366,6 +367,25 @@ pub fn decay<'py>(
     how.scans = scans;
     reported(py, progress, |_, progress| {
         operations::decay(folder_of(&map)?, &how, |done, all| progress.report(done, all))
+    })
+}
+
+/// Makes occupied voxels unknown that no scan has hit for more than `seconds`. Ages count from the map's last hit, or
+/// from `now_ns`. The map needs the layer time; free voxels and those without a time remain.
+#[pyfunction]
+#[pyo3(signature = (map, seconds, *, now_ns=None, progress=None))]
+pub fn forget_old<'py>(
+    py: Python<'py>,
+    map: PathBuf,
+    seconds: f64,
+    now_ns: Option<i64>,
+    progress: Callback,
+) -> PyResult<Bound<'py, PyAny>> {
+    let age = Duration::try_from_secs_f64(seconds)
+        .map_err(|_| wrong(py, "seconds", format!("must be at least 0 and finite, not {seconds}")))?;
+    let rule = now_ns.map_or(MaxAge::new(age), |now_ns| MaxAge::new(age).with_now(now_ns));
+    reported(py, progress, |_, progress| {
+        operations::forget_old(folder_of(&map)?, &rule, |done, all| progress.report(done, all))
     })
 }
 

@@ -225,6 +225,24 @@ def test_decay_verify_repair(city: Path) -> None:
     assert voxtile.verify(city)["damage"] == 0
 
 
+def test_voxels_without_recent_hits_are_forgotten(tmp_path: Path) -> None:
+    day_ns, first = 86_400 * 10**9, 15_000
+    scans = tmp_path / "scans"
+    scans.mkdir()
+    seconds = [(first + day) * 86_400 for day in range(3)]
+    for day, stamp in enumerate(seconds):
+        (scans / f"{stamp}.000000.xyz").write_text(f"{2.1 + day} {day + 1.1} 0.1\n")
+    (scans / "poses_tum.txt").write_text("".join(f"{stamp} 0.1 0.1 0.1 0 0 0 1\n" for stamp in seconds))
+    voxtile.build(scans, tmp_path / "map", resolution=0.25, layers="time")
+    with pytest.raises(errors.ArgumentError, match="seconds: must be at least 0"):
+        voxtile.forget_old(tmp_path / "map", -1.0)
+    report = voxtile.forget_old(tmp_path / "map", 1.5 * 86_400)
+    assert report["voxels_forgotten"] == 1 and report["oldest_ns"] == (2 * first + 1) * day_ns // 2
+    assert voxtile.forget_old(tmp_path / "map", 86_400, now_ns=(first + 4) * day_ns)["voxels_forgotten"] == 2
+    with voxtile.Map.create(tmp_path / "plain", 0.25), pytest.raises(errors.VoxtileError):
+        voxtile.forget_old(tmp_path / "plain", 1.0)
+
+
 def test_export_and_files_of_octomap(city: Path, tmp_path: Path) -> None:
     voxtile.export(city, tmp_path / "city.ot")
     calls: list[tuple[int, int]] = []

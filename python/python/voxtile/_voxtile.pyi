@@ -477,6 +477,13 @@ def decay(
     forget_below: float = 0.0,
     progress: _Progress | None = None,
 ) -> dict[str, Any]: ...
+def forget_old(
+    map: _Path,
+    seconds: float,
+    *,
+    now_ns: int | None = None,
+    progress: _Progress | None = None,
+) -> dict[str, Any]: ...
 def verify(
     map: _Path,
     *,

@@ -76,22 +76,28 @@ impl ScanTracer {
         {
             return Ok(None);
         }
-        let mut updates = match (rules.rays.insert_mode, self.limit.is_none()) {
-            (InsertMode::PerScan, true) => scan_rays.per_scan(&mut self.per_scan)?,
+        let layers = rules.layers;
+        let updates = match (rules.rays.insert_mode, self.limit.is_none()) {
+            (InsertMode::PerScan, true) => scan_rays.per_scan(layers, &mut self.per_scan)?,
             (InsertMode::PerScan, false) => {
                 let parts = ScanParts::refused(rules.mapped, &self.stop);
-                match scan_rays.per_scan_in_parts(&mut self.per_scan, &self.limit, &parts)? {
+                match scan_rays.per_scan_in_parts(layers, &mut self.per_scan, &self.limit, &parts)? {
                     PerScanUpdates::Whole(updates) => updates,
-                    PerScanUpdates::InParts(_) => return Ok(None),
+                    PerScanUpdates::InParts(..) => return Ok(None),
                 }
             }
-            (InsertMode::PerRay, true) if rules.are_rays_in_order() => scan_rays.per_ray_in_order()?,
-            (InsertMode::PerRay, true) => scan_rays.per_ray(&mut self.per_ray)?,
+            (InsertMode::PerRay, true) => {
+                let mut updates = match rules.are_rays_in_order() {
+                    true => scan_rays.per_ray_in_order()?,
+                    false => scan_rays.per_ray(&mut self.per_ray)?,
+                };
+                scan_rays.add_hits(layers, &mut updates)?;
+                updates
+            }
             // The size of these updates is unknown before they are collected, so the caller must trace the scan in
             // parts.
             (InsertMode::PerRay, false) => return Ok(None),
         };
-        scan_rays.add_hits(rules.layers, &mut updates)?;
         self.stop.check()?;
         Ok(Some(updates))
     }

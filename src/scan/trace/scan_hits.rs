@@ -1,5 +1,5 @@
-//! Collects the points of a scan that hit voxels, for the layers of a map. It is a pass of its own over the points, so
-//! that maps without layers do not pay for it.
+//! Collects the points of a scan that hit voxels, for the layers of a map: while rays are traced, or in a pass of its own
+//! over the points, if a memory limit or the insertion per ray divides the work otherwise.
 
 use super::scan_rays::{ScanRays, is_set, part_of};
 use crate::config::Layers;
@@ -9,8 +9,8 @@ use crate::scan::spill::Overflow;
 use crate::scan::updates::{
     LayerHit, LayerHits, MappedTiles, OFFSETS_PER_VOXEL, ScanUpdates, TileUpdates, in_order_of_tiles,
 };
-use crate::scan::{AttributeSlices, ChunkMarks, PackedUpdates, PointFrame, ScanReport};
-use crate::space::{Point, TileIndex, VoxelBox, VoxelIndex};
+use crate::scan::{AttributeSlices, ChunkMarks, PackedUpdates, PointFrame, ScanReport, TakeAttributed};
+use crate::space::{Point, TileIndex, VoxelIndex};
 use rayon::prelude::*;
 use rustc_hash::FxHashMap;
 use std::ops::Range;
@@ -18,7 +18,7 @@ use std::ops::Range;
 /// Bytes of memory that a point takes while hits are collected, in lists that may be half empty.
 pub(super) const BYTES_PER_POINT: usize = 2 * size_of::<LayerHit>() + 8;
 
-impl ScanRays<'_> {
+impl<'a> ScanRays<'a> {
     /// Adds the points that hit voxels to the updates of a scan.
     pub(super) fn add_hits(&self, layers: Layers, updates: &mut ScanUpdates) -> Result<()> {
         if !layers.is_none() {
@@ -51,14 +51,45 @@ impl ScanRays<'_> {
         Ok(())
     }
 
-    fn hits(&self, layers: Layers, points: Range<usize>, threads: usize) -> Result<HitsByTile<'_>> {
+    /// An empty list.
+    pub(super) fn no_hits(&self, layers: Layers) -> HitsByTile<'a> {
+        HitsByTile::new(self.mapped(), layers, self.points().stamp_ns())
+    }
+
+    /// Passes a range of the points in the world frame, with the attributes that layers need.
+    pub(super) fn for_each_attributed_chunk(
+        &self,
+        layers: Layers,
+        range: Range<usize>,
+        take: &mut TakeAttributed<'_>,
+    ) -> Result<()> {
+        if layers.is_none() {
+            let take = &mut |points: &[Point], intensities: Option<&[f32]>| {
+                take(points, intensities, AttributeSlices::default())
+            };
+            return self.points().for_each_chunk(range, take);
+        }
+        self.points().for_each_attributed_chunk(
+            range,
+            PointFrame::World,
+            &mut |points, intensities, attributes| {
+                let attributes = AttributeSlices {
+                    colours: if layers.colour { attributes.colours } else { &[] },
+                    classes: if layers.class { attributes.classes } else { &[] },
+                };
+                take(points, intensities, attributes)
+            },
+        )
+    }
+
+    fn hits(&self, layers: Layers, points: Range<usize>, threads: usize) -> Result<HitsByTile<'a>> {
         let parts = (0..threads).into_par_iter().map(|part| {
-            let mut hits = HitsByTile::new(self.mapped(), layers, self.points().stamp_ns());
+            let mut hits = self.no_hits(layers);
             self.take_hits(&mut hits, part_of(&points, part, threads))?;
             Ok(hits)
         });
         let mut parts = parts.collect::<Result<Vec<_>>>()?.into_iter();
-        let mut all = parts.next().unwrap_or_else(|| HitsByTile::new(self.mapped(), layers, None));
+        let mut all = parts.next().unwrap_or_else(|| self.no_hits(layers));
         parts.for_each(|part| all.append(part));
         Ok(all)
     }
@@ -66,31 +97,18 @@ impl ScanRays<'_> {
     fn take_hits(&self, hits: &mut HitsByTile<'_>, range: Range<usize>) -> Result<()> {
         let mut marks = ChunkMarks::from(self.points().moving(), range.start);
         let mut report = ScanReport::default();
-        self.points().for_each_attributed_chunk(
-            range,
-            PointFrame::World,
-            &mut |points, intensities, attributes| {
-                let attributes = AttributeSlices {
-                    colours: if hits.layers.colour { attributes.colours } else { &[] },
-                    classes: if hits.layers.class { attributes.classes } else { &[] },
-                };
-                let is_moving = marks.next(points.len());
-                for (number, &point) in points.iter().enumerate() {
-                    let intensity = intensities.map_or(f32::NAN, |intensities| intensities[number]);
-                    let of_ray = if intensities.is_some() { intensity } else { 0.0 };
-                    let end = self.end(point, of_ray, is_set(is_moving, number), &mut report);
-                    if let Some(RayEnd { point, voxel, hit: Some(_), .. }) = end {
-                        hits.push(point, voxel, |layers| LayerHit {
-                            intensity: layers.stored_intensity(intensity),
-                            colour: attributes.colour(number),
-                            class: attributes.class(number),
-                            ..LayerHit::default()
-                        });
-                    }
+        self.for_each_attributed_chunk(hits.layers, range, &mut |points, intensities, attributes| {
+            let is_moving = marks.next(points.len());
+            for (number, &point) in points.iter().enumerate() {
+                let intensity = intensities.map_or(f32::NAN, |intensities| intensities[number]);
+                let of_ray = if intensities.is_some() { intensity } else { 0.0 };
+                let end = self.end(point, of_ray, is_set(is_moving, number), &mut report);
+                if let Some(end) = end.filter(|end| end.hit.is_some()) {
+                    hits.push_point(&end, intensity, attributes, number);
                 }
-                !self.stop().is_set()
-            },
-        )
+            }
+            !self.stop().is_set()
+        })
     }
 }
 
@@ -99,11 +117,30 @@ pub(crate) struct HitsByTile<'a> {
     mapped: MappedTiles<'a>,
     layers: Layers,
     stamp_ns: Option<i64>,
-    lists: Vec<(TileIndex, VoxelBox, LayerHits)>,
+    lists: Vec<TileHits>,
     slots: FxHashMap<TileIndex, usize>,
     /// Slot of the last hit: consecutive hits are mostly in the same tile.
     latest: usize,
     count: usize,
+}
+
+struct TileHits {
+    tile: TileIndex,
+    /// Lowest voxel of the tile.
+    lowest: VoxelIndex,
+    /// Voxels along each axis.
+    edges: [u32; 3],
+    hits: LayerHits,
+}
+
+impl TileHits {
+    /// The voxel relative to the tile's lowest; `None` if it is outside of the tile.
+    #[inline]
+    fn offset_of(&self, voxel: VoxelIndex) -> Option<VoxelIndex> {
+        let offset: [u32; 3] = std::array::from_fn(|k| voxel[k].wrapping_sub(self.lowest[k]) as u32);
+        let is_inside = (0..3).all(|k| offset[k] < self.edges[k]);
+        is_inside.then(|| offset.map(|k| k as i32))
+    }
 }
 
 impl<'a> HitsByTile<'a> {
@@ -112,20 +149,36 @@ impl<'a> HitsByTile<'a> {
         Self { mapped, layers, stamp_ns, lists, slots, latest: 0, count: 0 }
     }
 
+    /// Adds point `number` of a chunk, at which a ray ends; its intensity is NaN if it has none.
+    #[inline]
+    pub(super) fn push_point(
+        &mut self,
+        end: &RayEnd,
+        intensity: f32,
+        attributes: AttributeSlices<'_>,
+        number: usize,
+    ) {
+        self.push(end.point, end.voxel, |layers| LayerHit {
+            intensity: layers.stored_intensity(intensity),
+            colour: attributes.colour(number),
+            class: attributes.class(number),
+            ..LayerHit::default()
+        });
+    }
+
     /// Adds a point, in units of voxels, that hit a voxel; `make` returns its attributes.
     #[inline]
     pub(crate) fn push(&mut self, point: Point, voxel: VoxelIndex, make: impl FnOnce(&Layers) -> LayerHit) {
-        if !self.lists.get(self.latest).is_some_and(|(_, tile, _)| tile.contains(voxel)) {
-            let tile = self.mapped.grid.tile_of_voxel(voxel);
-            if !self.mapped.has(tile) {
-                return;
+        let offset = match self.lists.get(self.latest).and_then(|list| list.offset_of(voxel)) {
+            Some(offset) => offset,
+            None => {
+                let Some(offset) = self.enter(voxel) else { return };
+                offset
             }
-            self.latest = self.slot(tile);
-        }
+        };
         let layers = &self.layers;
-        let (_, tile, hits) = &mut self.lists[self.latest];
         let mut hit = make(layers);
-        hit.voxel = LayerHit::packed_voxel(std::array::from_fn(|k| voxel[k].wrapping_sub(tile.min[k])));
+        hit.voxel = LayerHit::packed_voxel(offset);
         if layers.shape {
             let edge = f64::from(OFFSETS_PER_VOXEL);
             hit.offset = std::array::from_fn(|k| {
@@ -133,8 +186,18 @@ impl<'a> HitsByTile<'a> {
                 ((share * edge).floor().clamp(0.0, edge - 1.0) - edge / 2.0) as i16
             });
         }
-        hits.push(hit);
+        self.lists[self.latest].hits.push(hit);
         self.count += 1;
+    }
+
+    /// Makes the tile of a voxel the latest; returns the voxel relative to its lowest. `None` if it is not mapped.
+    fn enter(&mut self, voxel: VoxelIndex) -> Option<VoxelIndex> {
+        let tile = self.mapped.grid.tile_of_voxel(voxel);
+        if !self.mapped.has(tile) {
+            return None;
+        }
+        self.latest = self.slot(tile);
+        self.lists[self.latest].offset_of(voxel)
     }
 
     /// Upper bound on the bytes of memory.
@@ -145,27 +208,39 @@ impl<'a> HitsByTile<'a> {
     fn slot(&mut self, tile: TileIndex) -> usize {
         *self.slots.entry(tile).or_insert_with(|| {
             let voxels = self.mapped.grid.voxels_of_tile(tile);
-            self.lists.push((tile, voxels, LayerHits::new(self.layers, self.stamp_ns)));
+            self.lists.push(TileHits {
+                tile,
+                lowest: voxels.min,
+                edges: std::array::from_fn(|k| voxels.end[k].wrapping_sub(voxels.min[k]) as u32),
+                hits: LayerHits::new(self.layers, self.stamp_ns),
+            });
             self.lists.len() - 1
         })
     }
 
-    fn append(&mut self, others: Self) {
-        for (tile, _, mut hits) in others.lists {
-            let slot = self.slot(tile);
-            self.lists[slot].2.append(&mut hits);
+    pub(super) fn append(&mut self, others: Self) {
+        if self.lists.is_empty() {
+            *self = others;
+            return;
+        }
+        for mut list in others.lists {
+            let slot = self.slot(list.tile);
+            self.lists[slot].hits.append(&mut list.hits);
         }
     }
 
     pub(crate) fn into_packed(self) -> Vec<(TileIndex, PackedUpdates)> {
-        let packed = |(tile, _, hits)| (tile, PackedUpdates::of(&TileUpdates::Layers(hits)));
+        let packed = |list: TileHits| (list.tile, PackedUpdates::of(&TileUpdates::Layers(list.hits)));
         self.lists.into_iter().map(packed).collect()
     }
 
     /// Adds the hits to the updates of the same scan.
     pub(crate) fn add_to(self, updates: &mut ScanUpdates) {
+        if self.lists.is_empty() {
+            return;
+        }
         let mut hits: FxHashMap<TileIndex, LayerHits> =
-            self.lists.into_iter().map(|(tile, _, hits)| (tile, hits)).collect();
+            self.lists.into_iter().map(|list| (list.tile, list.hits)).collect();
         let tiles =
             std::mem::take(&mut updates.tiles).into_iter().map(|(tile, of_tile)| match hits.remove(&tile) {
                 Some(hits) => (tile, of_tile.with_layers(hits)),

@@ -1,6 +1,7 @@
+use super::scan_hits::HitsByTile;
 use super::scan_tracer::{ScanTracer, TraceRules, origin_voxel};
 use super::trace_limit::{CollectorLimit, TraceLimit};
-use crate::config::RayConfig;
+use crate::config::{Layers, RayConfig};
 use crate::error::Result;
 use crate::scan::clearing::Clearance;
 use crate::scan::coherence::{sampling_passes, single_pass};
@@ -48,11 +49,11 @@ pub(crate) struct ScanRays<'a> {
 }
 
 /// Result of an insertion per scan under a memory limit.
-pub(crate) enum PerScanUpdates {
+pub(crate) enum PerScanUpdates<'a> {
     /// All updates fitted in memory.
     Whole(ScanUpdates),
-    /// They did not fit and were all added to the parts. The report covers the points.
-    InParts(ScanReport),
+    /// They did not fit and were all added to the parts. The report covers the points; the hits are in no part.
+    InParts(ScanReport, HitsByTile<'a>),
 }
 
 impl<'a> ScanRays<'a> {
@@ -113,52 +114,70 @@ impl<'a> ScanRays<'a> {
 
     /// Insertion per scan: one update per voxel, a hit overrides any miss. The result does not depend on the order of
     /// the rays, so they are divided among threads.
-    pub(crate) fn per_scan(&self, collectors: &mut Vec<PerScanCollector>) -> Result<ScanUpdates> {
-        let (collectors, report) =
-            self.collect_per_scan(collectors, self.threads(), &CollectorLimit::NONE, None)?;
+    ///
+    /// The points that hit voxels are collected on the way, for the given layers.
+    pub(crate) fn per_scan(
+        &self,
+        layers: Layers,
+        collectors: &mut Vec<PerScanCollector>,
+    ) -> Result<ScanUpdates> {
+        let (collectors, report, hits) =
+            self.collect_per_scan(layers, collectors, self.threads(), &CollectorLimit::NONE, None)?;
         self.stop.check()?;
-        Ok(self.merge(collectors, report))
+        Ok(self.merge(collectors, report, hits))
     }
 
     /// Like [`Self::per_scan`], under a memory limit: updates that do not fit are all added to `parts`.
     pub(crate) fn per_scan_in_parts(
         &self,
+        layers: Layers,
         collectors: &mut Vec<PerScanCollector>,
         limit: &TraceLimit,
         parts: &ScanParts<'_>,
-    ) -> Result<PerScanUpdates> {
+    ) -> Result<PerScanUpdates<'a>> {
         let threads = limit.collectors(self.threads());
-        let (collectors, report) =
-            self.collect_per_scan(collectors, threads, &limit.of_collector(threads), Some(parts))?;
+        let (collectors, report, hits) =
+            self.collect_per_scan(layers, collectors, threads, &limit.of_collector(threads), Some(parts))?;
         self.stop.check()?;
         if parts.is_empty() && limit.has_room_for(collectors, self.mapped.grid) {
-            return Ok(PerScanUpdates::Whole(self.merge(collectors, report)));
+            return Ok(PerScanUpdates::Whole(self.merge(collectors, report, hits)));
         }
         collectors.par_iter_mut().for_each(|collector| collector.finish(parts));
-        Ok(PerScanUpdates::InParts(report))
+        Ok(PerScanUpdates::InParts(report, hits))
     }
 
-    fn merge(&self, collectors: &mut [PerScanCollector], report: ScanReport) -> ScanUpdates {
+    fn merge(
+        &self,
+        collectors: &mut [PerScanCollector],
+        report: ScanReport,
+        hits: HitsByTile<'_>,
+    ) -> ScanUpdates {
         let (first, others) = collectors.split_at_mut(1);
         others.iter().for_each(|other| first[0].absorb(other));
-        first[0].updates(self.mapped, self.clearance.as_ref(), report)
+        let mut updates = first[0].updates(self.mapped, self.clearance.as_ref(), report);
+        hits.add_to(&mut updates);
+        updates
     }
 
     fn collect_per_scan<'c>(
         &self,
+        layers: Layers,
         collectors: &'c mut Vec<PerScanCollector>,
         threads: usize,
         limit: &CollectorLimit,
         parts: Option<&ScanParts<'_>>,
-    ) -> Result<(&'c mut [PerScanCollector], ScanReport)> {
+    ) -> Result<(&'c mut [PerScanCollector], ScanReport, HitsByTile<'a>)> {
         let needs_intensity = self.model.needs_intensity();
-        self.collect(collectors, threads, |collector, range| {
+        let all = 0..self.points.len();
+        let collected = self.collect_each(collectors, all, threads, |collector, range| {
             collector.clear(self.window, limit);
+            // Ends of the rays of a chunk, if points are collected for layers.
+            let (mut hits, mut ends) = (self.no_hits(layers), Vec::new());
             let mut report = ScanReport { points: range.len() as u64, ..ScanReport::default() };
             let mut batch = Vec::with_capacity(BATCH);
             let (mut seen, mut extend_at) = (0, 0);
             let mut marks = ChunkMarks::from(self.points.moving(), range.start);
-            self.points.for_each_chunk(range, &mut |points, intensities| {
+            self.for_each_attributed_chunk(layers, range, &mut |points, intensities, attributes| {
                 // Extending the prefixes takes equally long for each chunk, but later chunks add less to them. So they
                 // are extended whenever the number of points has doubled.
                 let extends = seen >= extend_at;
@@ -167,18 +186,31 @@ impl<'a> ScanRays<'a> {
                 }
                 seen += points.len();
                 let is_moving = marks.next(points.len());
+                ends.clear();
+                if !layers.is_none() {
+                    // In the order of the points, because neighbors often hit the same voxel.
+                    ends.extend((0..points.len()).map(|number| {
+                        let of_ray = intensity(intensities, number);
+                        let is_moving = is_set(is_moving, number);
+                        let end = self.end(points[number], of_ray, is_moving, &mut report);
+                        if let Some(end) = end.filter(|end| end.hit.is_some()) {
+                            let intensity = intensities.map_or(f32::NAN, |_| of_ray);
+                            hits.push_point(&end, intensity, attributes, number);
+                        }
+                        end
+                    }));
+                }
                 for pass in
                     if extends { sampling_passes(0..points.len()) } else { single_pass(0..points.len()) }
                 {
                     collector.extend_prefixes(&self.origin, pass.squares, self.cut.as_ref());
                     for number in pass.points() {
-                        let intensity = intensity(intensities, number);
-                        batch.extend(self.ray(
-                            points[number],
-                            intensity,
-                            is_set(is_moving, number),
-                            &mut report,
-                        ));
+                        batch.extend(if layers.is_none() {
+                            let intensity = intensity(intensities, number);
+                            self.ray(points[number], intensity, is_set(is_moving, number), &mut report)
+                        } else {
+                            ends[number].and_then(|end| self.cut(end))
+                        });
                         if batch.len() == BATCH {
                             collector.take(&self.origin, &batch, needs_intensity, parts);
                             batch.clear();
@@ -192,8 +224,14 @@ impl<'a> ScanRays<'a> {
                 }
                 self.continues(parts)
             })?;
-            Ok(report)
-        })
+            Ok((report, hits))
+        })?;
+        let mut all = (ScanReport::default(), self.no_hits(layers));
+        for (report, hits) in collected {
+            all.0 += report;
+            all.1.append(hits);
+        }
+        Ok((&mut collectors[..threads], all.0, all.1))
     }
 
     /// Insertion per ray, in the order of the points: the misses of a ray from the sensor outward, then its hit.
@@ -351,13 +389,13 @@ impl<'a> ScanRays<'a> {
         Ok((&mut collectors[..parts], report))
     }
 
-    fn collect_each<C: Default + Send>(
+    fn collect_each<C: Default + Send, R: Send>(
         &self,
         collectors: &mut Vec<C>,
         points: Range<usize>,
         parts: usize,
-        collect: impl Fn(&mut C, Range<usize>) -> Result<ScanReport> + Sync,
-    ) -> Result<Vec<ScanReport>> {
+        collect: impl Fn(&mut C, Range<usize>) -> Result<R> + Sync,
+    ) -> Result<Vec<R>> {
         if collectors.len() < parts {
             collectors.resize_with(parts, C::default);
         }
@@ -409,7 +447,12 @@ impl<'a> ScanRays<'a> {
     /// that is marked as moving is no hit.
     #[inline]
     fn ray(&self, point: Point, intensity: f32, is_moving: bool, report: &mut ScanReport) -> Option<RayEnd> {
-        let end = self.end(point, intensity, is_moving, report)?;
+        self.end(point, intensity, is_moving, report).and_then(|end| self.cut(end))
+    }
+
+    /// Clips a whole ray to the mapped tiles; `None` if it crosses none.
+    #[inline]
+    fn cut(&self, end: RayEnd) -> Option<RayEnd> {
         match &self.cut {
             None => Some(end),
             Some(cut) => cut.apply(&self.origin, end),

@@ -1,3 +1,4 @@
+use super::scan_hits::BYTES_PER_POINT;
 use super::scan_rays::{PerScanUpdates, ScanRays};
 use super::trace_limit::TraceLimit;
 use crate::config::{GUARD_REACH, Guard, InsertMode, Layers, RayConfig};
@@ -117,7 +118,7 @@ impl ScanTracer {
         let in_order = rules.are_rays_in_order();
         let Some(mut overflow) = overflow else {
             let mut updates = match (is_per_scan, in_order) {
-                (true, _) => scan_rays.per_scan(&mut self.per_scan),
+                (true, _) => return scan_rays.per_scan(layers, &mut self.per_scan),
                 (_, true) => scan_rays.per_ray_in_order(),
                 _ => scan_rays.per_ray(&mut self.per_ray),
             }?;
@@ -132,19 +133,27 @@ impl ScanTracer {
             overflow.max_tiles,
             overflow.make_scratch,
         );
-        let report = match (is_per_scan, in_order) {
-            (true, _) => match scan_rays.per_scan_in_parts(&mut self.per_scan, &self.limit, &parts)? {
-                PerScanUpdates::Whole(mut updates) => {
-                    scan_rays.add_hits_in_parts(layers, &mut updates, &mut overflow)?;
-                    return Ok(updates);
+        // Hits that may not fit are collected after the rays.
+        let hits_fit = is_per_scan && scan.len() <= overflow.max_bytes / 4 / BYTES_PER_POINT;
+        let (with_rays, later) = if hits_fit { (layers, Layers::NONE) } else { (Layers::NONE, layers) };
+        let (report, hits) = match (is_per_scan, in_order) {
+            (true, _) => {
+                match scan_rays.per_scan_in_parts(with_rays, &mut self.per_scan, &self.limit, &parts)? {
+                    PerScanUpdates::Whole(mut updates) => {
+                        scan_rays.add_hits_in_parts(later, &mut updates, &mut overflow)?;
+                        return Ok(updates);
+                    }
+                    PerScanUpdates::InParts(report, hits) => (report, Some(hits)),
                 }
-                PerScanUpdates::InParts(report) => report,
-            },
-            (_, true) => scan_rays.per_ray_in_order_in_parts(&self.limit, &parts)?,
-            _ => scan_rays.per_ray_in_parts(&mut self.per_ray, &self.limit, &parts)?,
+            }
+            (_, true) => (scan_rays.per_ray_in_order_in_parts(&self.limit, &parts)?, None),
+            _ => (scan_rays.per_ray_in_parts(&mut self.per_ray, &self.limit, &parts)?, None),
         };
         let mut updates = parts.into_updates(report, is_per_scan, &self.stop, &mut overflow)?;
-        scan_rays.add_hits_in_parts(layers, &mut updates, &mut overflow)?;
+        if let Some(hits) = hits {
+            hits.add_to(&mut updates);
+        }
+        scan_rays.add_hits_in_parts(later, &mut updates, &mut overflow)?;
         Ok(updates)
     }
 

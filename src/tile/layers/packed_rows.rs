@@ -8,11 +8,12 @@ pub(super) struct PackedRows {
     /// First bit of each column in a row; only valid if `ends` is not 0.
     starts: [u8; COLUMNS],
     /// Number of columns up to the last one with bits.
-    used: usize,
+    used: u8,
     /// Bytes of a row.
-    stride: usize,
-    /// The bit after each column. 0 if a row has more bits than [`PackedRows::add`] supports.
-    ends: u128,
+    stride: u8,
+    /// The bit after each column, as a `u128` that needs no alignment. 0 if a row has more bits than
+    /// [`PackedRows::add_if`] supports.
+    ends: [u8; 16],
     /// The rows, and [`PADDING`] bytes after the last one.
     bytes: Vec<u8>,
 }
@@ -53,28 +54,45 @@ impl SummandPacker<'_> {
 }
 
 impl PackedRows {
+    /// Bytes of a row.
+    #[inline]
+    fn stride(&self) -> usize {
+        usize::from(self.stride)
+    }
+
+    #[inline]
+    fn ends(&self) -> u128 {
+        u128::from_le_bytes(self.ends)
+    }
+
+    /// Returns whether rows have at most 127 bits, so that one addition adds all columns.
+    #[inline]
+    fn has_packed_rows(&self) -> bool {
+        self.ends() != 0
+    }
+
     pub(super) fn len(&self) -> usize {
-        self.bytes.len().saturating_sub(PADDING).checked_div(self.stride).unwrap_or(0)
+        self.bytes.len().saturating_sub(PADDING).checked_div(self.stride()).unwrap_or(0)
     }
 
     /// Starts the integers that are to be added to a row; `None` if rows have too many bits for that.
     #[inline]
     pub(super) fn summand(&self) -> Option<SummandPacker<'_>> {
-        (self.ends != 0).then_some(SummandPacker { rows: self, bits: 0, excess: 0 })
+        self.has_packed_rows().then_some(SummandPacker { rows: self, bits: 0, excess: 0 })
     }
 
     /// Adds integers to the columns of a row if the integer in `column` is `value`. Returns `false`, with the row
     /// unchanged, if it is another one, or if one of the sums has too many bits.
     #[inline]
     pub(super) fn add_if(&mut self, number: usize, summand: Summand, column: usize, value: u64) -> bool {
-        let at = number * self.stride;
+        let at = number * self.stride();
         let Some(bytes) = self.bytes.get(at..).and_then(<[u8]>::first_chunk) else { return false };
         // The next rows follow the last column.
         let before = u128::from_le_bytes(*bytes);
         let sum = before.wrapping_add(summand.bits);
         // A bit of the sum differs from the sum without carries where a carry arrived.
         let carries = before ^ summand.bits ^ sum;
-        let fits = summand.fits && carries & self.ends == 0 && self.value_in(before, column) == value;
+        let fits = summand.fits && carries & self.ends() == 0 && self.value_in(before, column) == value;
         if fits && let Some(bytes) = self.bytes[at..].first_chunk_mut() {
             *bytes = sum.to_le_bytes();
         }
@@ -93,7 +111,7 @@ impl PackedRows {
     pub(super) fn insert_sum(&mut self, number: usize, summand: Summand) -> bool {
         if summand.fits {
             self.make_gap(number);
-            let of_row = u128::MAX >> (128 - 8 * self.stride);
+            let of_row = u128::MAX >> (128 - 8 * self.stride());
             if let Some(bytes) = self.packed_row(number) {
                 *bytes = (u128::from_le_bytes(*bytes) & !of_row | summand.bits).to_le_bytes();
             }
@@ -104,7 +122,8 @@ impl PackedRows {
     /// The bytes of a row and those after it.
     #[inline]
     fn packed_row(&mut self, number: usize) -> Option<&mut [u8; size_of::<u128>()]> {
-        self.bytes.get_mut(number * self.stride..)?.first_chunk_mut()
+        let at = number * self.stride();
+        self.bytes.get_mut(at..)?.first_chunk_mut()
     }
 
     pub(super) fn heap_bytes(&self) -> usize {
@@ -121,17 +140,17 @@ impl PackedRows {
     /// Reads a row. The columns after the last used one remain as they are.
     #[inline]
     pub(super) fn read(&self, number: usize, row: &mut Row) {
-        if self.ends != 0
-            && let Some(bytes) = self.bytes.get(number * self.stride..).and_then(<[u8]>::first_chunk)
+        if self.has_packed_rows()
+            && let Some(bytes) = self.bytes.get(number * self.stride()..).and_then(<[u8]>::first_chunk)
         {
             let packed = u128::from_le_bytes(*bytes);
-            for (column, integer) in row.0.iter_mut().enumerate().take(self.used) {
+            for (column, integer) in row.0.iter_mut().enumerate().take(self.used.into()) {
                 *integer = self.value_in(packed, column);
             }
             return;
         }
-        let mut at = number * self.stride * 8;
-        for (column, &bits) in row.0.iter_mut().zip(&self.bits[..self.used]) {
+        let mut at = number * self.stride() * 8;
+        for (column, &bits) in row.0.iter_mut().zip(&self.bits[..self.used.into()]) {
             *column = 0;
             if bits > 0 {
                 *column = self.field(at, bits);
@@ -151,26 +170,27 @@ impl PackedRows {
     pub(super) fn insert(&mut self, number: usize, row: &Row) {
         self.make_room_for(row);
         self.make_gap(number);
-        let at = number * self.stride;
-        self.bytes[at..at + self.stride].fill(0);
+        let stride = self.stride();
+        let at = number * stride;
+        self.bytes[at..at + stride].fill(0);
         self.write(number, row);
     }
 
     /// Makes room for a row before the row with this number. The room has no defined content.
     fn make_gap(&mut self, number: usize) {
-        let at = number * self.stride;
-        let len = self.bytes.len();
-        if len + self.stride > self.bytes.capacity() {
+        let (stride, len) = (self.stride(), self.bytes.len());
+        let at = number * stride;
+        if len + stride > self.bytes.capacity() {
             // Less slack than the default growth of a vector.
-            self.bytes.reserve_exact((4 * self.stride).max(len / 4));
+            self.bytes.reserve_exact((4 * stride).max(len / 4));
         }
-        self.bytes.resize(len + self.stride, 0);
-        self.bytes.copy_within(at..len, at + self.stride);
+        self.bytes.resize(len + stride, 0);
+        self.bytes.copy_within(at..len, at + stride);
     }
 
     #[inline]
     fn fits(&self, row: &Row) -> bool {
-        let (used, others) = row.0.split_at(self.used);
+        let (used, others) = row.0.split_at(self.used.into());
         // Without branches: nearly all rows fit.
         let too_large = used.iter().zip(&self.bits).fold(0, |all, (&value, &bits)| {
             let above = value >> (bits / 2) >> (bits - bits / 2);
@@ -202,9 +222,9 @@ impl PackedRows {
         bits[RED..RED + 3].fill(most);
         let mut wider = Self::with_bits(bits);
         let count = self.len();
-        wider.bytes = vec![0; count * wider.stride + PADDING];
+        wider.bytes = vec![0; count * wider.stride() + PADDING];
         for number in 0..count {
-            match self.ends != 0 && wider.ends != 0 {
+            match self.has_packed_rows() && wider.has_packed_rows() {
                 true => self.copy_packed(number, &mut wider),
                 false => wider.write(number, &self.get(number)),
             }
@@ -214,7 +234,7 @@ impl PackedRows {
 
     fn with_bits(bits: [u8; COLUMNS]) -> Self {
         let used = bits.iter().rposition(|bits| *bits > 0).map_or(0, |last| last + 1);
-        let (mut starts, mut total, mut ends) = ([0; COLUMNS], 0_usize, 0);
+        let (mut starts, mut total, mut ends) = ([0; COLUMNS], 0_usize, 0_u128);
         for (start, &bits) in starts.iter_mut().zip(&bits[..used]) {
             *start = total.min(127) as u8;
             total += usize::from(bits);
@@ -223,14 +243,16 @@ impl PackedRows {
         if total > 127 || bits.contains(&64) {
             ends = 0;
         }
-        Self { bits, starts, used, stride: total.div_ceil(8).max(1), ends, bytes: Vec::new() }
+        // At most 22 columns of 64 bits: 176 bytes.
+        let stride = total.div_ceil(8).max(1) as u8;
+        Self { bits, starts, used: used as u8, stride, ends: ends.to_le_bytes(), bytes: Vec::new() }
     }
 
     /// Copies a row in its packed form to the same row of `wider`.
     fn copy_packed(&mut self, number: usize, wider: &mut Self) {
         let Some(row) = self.packed_row(number).map(|bytes| u128::from_le_bytes(*bytes)) else { return };
         let mut wide = 0;
-        for column in 0..self.used {
+        for column in 0..usize::from(self.used) {
             if self.bits[column] > 0 {
                 wide |= u128::from(self.value_in(row, column)) << (wider.starts[column] & 127);
             }
@@ -243,8 +265,8 @@ impl PackedRows {
 
     #[inline]
     fn write(&mut self, number: usize, row: &Row) {
-        let mut at = number * self.stride * 8;
-        for (column, value) in row.0.iter().enumerate().take(self.used) {
+        let mut at = number * self.stride() * 8;
+        for (column, value) in row.0.iter().enumerate().take(self.used.into()) {
             let bits = self.bits[column];
             if bits > 0 {
                 self.set_field(at, bits, *value);
