@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 use voxtile::integrity::VerifyScope;
 use voxtile::mapper::{MapReader, MapView, OctreeMap};
-use voxtile::operations::{self, AreaPart, Decay, MaxAge, Part, Prefer};
+use voxtile::operations::{self, AreaPart, CopyScans, Decay, MaxAge, Part, Prefer};
 use voxtile::space::Grid;
 use voxtile::{MapPath, MemoryLimit, Result, SnapshotName, Stop, TileIndex, integrity};
 use voxtile_pipeline::{PolygonFile, check_is_no_file, octree_file};
@@ -302,19 +302,22 @@ pub fn crop<'py>(
     })
 }
 
-/// Makes a map of the same content with another storage, "octomap" or "compact".
+/// Makes a map of the same content with another storage, "octomap" or "compact". With `keep_scans=False` it does not get
+/// the scans that the map keeps.
 #[pyfunction]
-#[pyo3(signature = (map, output, storage, *, progress=None))]
+#[pyo3(signature = (map, output, storage, *, keep_scans=true, progress=None))]
 pub fn convert<'py>(
     py: Python<'py>,
     map: MapOrSnapshot,
     output: PathBuf,
     storage: &str,
+    keep_scans: bool,
     progress: Callback,
 ) -> PyResult<Bound<'py, PyAny>> {
     let storage = storage_of(py, storage)?;
+    let scans = if keep_scans { CopyScans::Yes } else { CopyScans::No };
     reported(py, progress, |_, progress| {
-        operations::convert(&map.open()?, &output, storage, |done, all| progress.report(done, all))
+        operations::convert(&map.open()?, &output, storage, scans, |done, all| progress.report(done, all))
     })
 }
 

@@ -305,7 +305,7 @@ impl MapReader {
         KeptSummary::of(self, each)
     }
 
-    pub(super) fn kept_records(&self) -> Result<KeptRecords> {
+    pub(crate) fn kept_records(&self) -> Result<KeptRecords> {
         self.explained(self.store.archive().records())
     }
 

@@ -3,7 +3,7 @@ use crate::error::{Error, Result};
 use crate::mapper::{MapReader, MapView};
 use crate::persistence::{TileSaver, config_from, copy_tile, new_map_id, new_metadata};
 use crate::space::TileIndex;
-use crate::store::{Disk, MapPath, Metadata, StagedMap, TileVersion, id_from_hex};
+use crate::store::{CatalogEntry, Disk, MapPath, Metadata, StagedMap, TileVersion, id_from_hex};
 use crate::tile::Table;
 use serde::Serialize;
 use std::path::Path;
@@ -80,7 +80,7 @@ impl MapWriter {
     pub fn create_as(disk: Arc<dyn Disk>, folder: &Path, metadata: Metadata) -> Result<Self> {
         let mut metadata = metadata;
         if let Some(ext) = &mut metadata.ext {
-            // The scans of the source map are not copied.
+            // `keep_scans_of` copies scans.
             ext.keeps_scans = false;
         }
         let config = config_from(&metadata, folder)?;
@@ -110,6 +110,31 @@ impl MapWriter {
         let store = self.map.store();
         map.scans()?.into_iter().for_each(|scan| store.note_scan(scan));
         Ok(())
+    }
+
+    /// Copies the scans that another map on the same disk keeps, with their numbers, and the numbers of removed ones. Must
+    /// be called before tiles are added.
+    ///
+    /// # Errors
+    ///
+    /// A damaged or unreadable scan, or an I/O error.
+    pub(super) fn keep_scans_of(&mut self, map: &MapReader) -> Result<()> {
+        let mut records = map.kept_records()?;
+        if let Some(ext) = &mut self.metadata.ext {
+            ext.keeps_scans = true;
+        }
+        let archive = self.map.store().archive_mut();
+        archive.begin();
+        archive.begin_catalog()?;
+        while let Some(mut entry) = map.explained(records.next_entry())? {
+            if let CatalogEntry::Kept(scan) = &mut entry {
+                for place in scan.places_mut() {
+                    *place = map.explained(archive.copy_from(map.store().layout(), *place))?;
+                }
+            }
+            archive.put(&entry)?;
+        }
+        self.commit()
     }
 
     /// Adds a tile. A tile without voxels is ignored.

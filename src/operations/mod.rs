@@ -41,7 +41,7 @@ mod table_change;
 mod table_merge;
 
 pub use clear::{Cleared, clear};
-pub use convert::convert;
+pub use convert::{CopyScans, convert};
 pub use crop::{crop, crop_area, crop_shard};
 pub use decay::{Decay, Decayed, decay};
 pub use diff::{Diff, TileChange, TileDiff, VoxelDiff, diff};

@@ -1,15 +1,17 @@
-use crate::harness::config;
+use crate::harness::{Act, State, all_layers, at, config, damage_in, keeping_scans, map as folder, perform};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use testkit::faulty_disk::{Fault, FaultyDisk, Unsynced};
 use testkit::random_scans::{Random, random_scan};
 use voxtile::integrity::verify;
-use voxtile::operations::{Part, convert, crop};
+use voxtile::mapper::KeptScan;
+use voxtile::operations::{CopyScans, Part, convert, crop};
+use voxtile::scan::ScanPoints;
 use voxtile::sensor::{Iwlo, SensorModel};
 use voxtile::space::Aabb;
 use voxtile::{
-    Error, MapConfig, MapPath, MapQueries, MapReader, MapView, Mapper, OutOfCoreTileMapper, Result, Scan,
-    Storage,
+    Error, MapConfig, MapPath, MapQueries, MapReader, MapView, Mapper, OutOfCoreTileMapper, Point, Result,
+    Scan, Storage,
 };
 
 const INPUT: &str = "random scans";
@@ -40,7 +42,7 @@ fn reader(disk: &FaultyDisk, name: &str) -> Result<MapReader> {
 fn converted(disk: &FaultyDisk, from: &str, to: &str, storage: Storage) -> Result<()> {
     let mut told = 0;
     let reader = reader(disk, from)?;
-    let written = convert(&reader, place(to), storage, |done, _| told = done)?;
+    let written = convert(&reader, place(to), storage, CopyScans::Yes, |done, _| told = done)?;
     assert_eq!((written.tiles, told), (reader.tile_indices().len() as u64, written.tiles));
     Ok(())
 }
@@ -135,8 +137,18 @@ fn copies_of_a_map_with_outdated_metadata_have_all_scans() {
 
 #[test]
 fn a_conversion_is_atomic_after_faults_and_power_cuts() {
+    is_atomic_after_faults_and_power_cuts(config());
+}
+
+#[test]
+fn a_conversion_with_kept_scans_is_atomic_after_faults_and_power_cuts() {
+    is_atomic_after_faults_and_power_cuts(keeping_scans());
+}
+
+fn is_atomic_after_faults_and_power_cuts(config: MapConfig) {
     let before = FaultyDisk::new(Fault::None);
-    let digest = map(&before, config());
+    let digest = map(&before, config);
+    let kept = kept_points(&reader(&before, "map").unwrap());
     let first = tile_files(&before, "map");
     let undisturbed = before.copy();
     let (operations, changes) = (undisturbed.operations(), undisturbed.changes());
@@ -146,6 +158,7 @@ fn a_conversion_is_atomic_after_faults_and_power_cuts() {
     let is_there = |disk: &FaultyDisk, what: &str| match reader(disk, "small") {
         Ok(reader) => {
             assert_eq!(reader.digest().unwrap_or_else(|error| panic!("{what}: {error:#}")), digest, "{what}");
+            assert_eq!(kept_points(&reader), kept, "{what}");
             true
         }
         Err(Error::NoMap { .. }) => false,
@@ -180,6 +193,88 @@ fn a_conversion_is_atomic_after_faults_and_power_cuts() {
             assert!(done.is_err() || is_there(&left, &what), "{what}");
             again(&left, &what);
         }
+    }
+}
+
+/// The points of the scans that a map keeps.
+fn kept_points(reader: &MapReader) -> Vec<Vec<Point>> {
+    let scans = reader.keeps_scans().then(|| reader.kept_scans().unwrap()).into_iter().flatten();
+    let points_of = |scan: Result<KeptScan>| {
+        let (scan, mut points) = (scan.unwrap(), Vec::new());
+        scan.for_each_chunk(0..scan.len(), &mut |some, _| {
+            points.extend_from_slice(some);
+            true
+        })
+        .unwrap();
+        points
+    };
+    scans.map(points_of).collect()
+}
+
+/// A disk with the map `from` of another one in the place of the map of the harness.
+fn moved(disk: &FaultyDisk, from: &str) -> FaultyDisk {
+    let other = FaultyDisk::new(Fault::None);
+    for (path, bytes) in disk.files() {
+        if let Ok(inside) = path.strip_prefix(place(from)) {
+            other.put(&folder().join(inside), &bytes);
+        }
+    }
+    other
+}
+
+#[test]
+fn copies_keep_scans_and_can_be_replayed() {
+    for (config, storage) in [
+        (keeping_scans(), Storage::Compact),
+        (keeping_scans().with_storage(Storage::Compact).with_layers(all_layers()), Storage::OctoMap),
+    ] {
+        let disk = FaultyDisk::new(Fault::None);
+        let mut state = State::default();
+        let removed = Act::RemovePoints(Aabb { min: [0.0, -1.0, -1.0], max: [1.0, 1.5, 1.5] });
+        let marked = Act::Mark { seed: 5, rest: Some(1) };
+        for act in [Act::Scans(0..4), Act::RemoveScans(2, 2), marked, Act::Scans(4..6), removed] {
+            perform(&disk, &config, &state, &act).unwrap();
+            state = state.after(&act, &config);
+        }
+        converted(&disk, "map", "copy", storage).unwrap();
+        let (copy, config) = (moved(&disk, "copy"), config.with_storage(storage));
+        assert!(state.is_on(&copy) && damage_in(&copy).is_empty(), "{storage}");
+        let segments = |disk: &FaultyDisk| -> usize {
+            let files = disk.files().into_iter();
+            let of_scans = files.filter(|(path, _)| path.starts_with(folder().join("kept_scans")));
+            of_scans.map(|(_, bytes)| bytes.len()).sum()
+        };
+        assert!(segments(&copy) < segments(&disk), "only points in use are copied");
+        for act in [Act::Move { seed: 3, rest: None }, Act::Scans(6..8), Act::RemoveScans(1, 1)] {
+            perform(&copy, &config, &state, &act).unwrap();
+            state = state.after(&act, &config);
+            assert!(state.is_on(&copy) && damage_in(&copy).is_empty(), "{storage}: {act:?}");
+        }
+        let whole = MapReader::open(at(&disk), 0).unwrap();
+        convert(&whole, place("small"), storage, CopyScans::No, |_, _| ()).unwrap();
+        let small = reader(&disk, "small").unwrap();
+        assert!(!small.keeps_scans() && small.scans().unwrap() == whole.scans().unwrap());
+        assert_eq!(small.digest().unwrap(), whole.digest().unwrap());
+    }
+}
+
+#[test]
+fn damaged_kept_scans_are_an_error_without_output() {
+    let whole = FaultyDisk::new(Fault::None);
+    map(&whole, keeping_scans());
+    for (path, bytes) in whole.files() {
+        if !path.starts_with(place("map/kept_scans")) {
+            continue;
+        }
+        let (disk, mut damaged) = (whole.copy(), bytes.clone());
+        let middle = damaged.len() / 2;
+        damaged[middle] ^= 4;
+        disk.put(&path, &damaged);
+        match converted(&disk, "map", "new", Storage::Compact) {
+            Err(Error::Damaged { path: named, .. }) => assert_eq!(named, path),
+            other => panic!("{other:?}"),
+        }
+        assert!(matches!(reader(&disk, "new"), Err(Error::NoMap { .. })));
     }
 }
 

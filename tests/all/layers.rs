@@ -10,8 +10,8 @@ use testkit::reference_map::{ReferenceMap, voxels_of};
 use testkit::unsynced_disk::UnsyncedDisk;
 use voxtile::integrity::{repair, verify};
 use voxtile::operations::{
-    Decay, MaxAge, Part, Prefer, Replay, ScanSelection, clear, convert, crop, decay, diff, forget_old, merge,
-    rebuild, remove_points, remove_scans,
+    CopyScans, Decay, MaxAge, Part, Prefer, Replay, ScanSelection, clear, convert, crop, decay, diff,
+    forget_old, merge, rebuild, remove_points, remove_scans,
 };
 use voxtile::sensor::{Iwlo, SensorModel};
 use voxtile::{
@@ -256,7 +256,7 @@ fn operations_keep_add_and_drop_layers() {
     let expected: LayerSums = b.into_iter().filter(|(voxel, _)| !is_in(voxel)).collect();
     assert!(layers_of(&open("b")) == expected);
 
-    let compact = convert(&open("a"), path("compact"), Storage::Compact, |_, _| {});
+    let compact = convert(&open("a"), path("compact"), Storage::Compact, CopyScans::Yes, |_, _| {});
     compact.unwrap();
     assert!(layers_of(&open("compact")) == a);
     let fading = Decay::new(2.0).with_scans(3).with_forget_below(0.3);

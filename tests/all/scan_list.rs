@@ -5,7 +5,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use tempfile::TempDir;
 use voxtile::integrity::{repair, verify};
-use voxtile::operations::{convert, revert, snapshot};
+use voxtile::operations::{CopyScans, convert, revert, snapshot};
 use voxtile::store::ScanRecord;
 use voxtile::{MapConfig, MapReader, Mapper, OutOfCoreTileMapper, Scan, ScanRef, SnapshotName, Storage};
 
@@ -61,7 +61,8 @@ fn a_map_lists_the_scans_of_its_last_flush() {
     mapper.flush().unwrap();
     assert_eq!(scans_of(&map), expected(7));
     let other = folder.path().join("other");
-    convert(&MapReader::open(&map, 1 << 20).unwrap(), &other, Storage::Compact, |_, _| ()).unwrap();
+    convert(&MapReader::open(&map, 1 << 20).unwrap(), &other, Storage::Compact, CopyScans::Yes, |_, _| ())
+        .unwrap();
     assert_eq!(scans_of(&other), expected(7));
 }
 

@@ -380,6 +380,9 @@ pub struct ConvertArgs {
     pub output: PathBuf,
     #[arg(long, value_name = "FORM", help = help::STORAGE)]
     pub storage: StorageName,
+    /// Do not copy the scans that the map keeps: the new map is smaller, but cannot be remapped
+    #[arg(long)]
+    pub drop_scans: bool,
     #[arg(long, help = help::JSON)]
     pub json: bool,
 }

@@ -12,7 +12,7 @@ use std::path::Path;
 use std::process::ExitCode;
 use std::time::Instant;
 use voxtile::mapper::{MapReader, MapView};
-use voxtile::operations::{WrittenMap, convert};
+use voxtile::operations::{CopyScans, WrittenMap, convert};
 use voxtile::{Result, Storage};
 use voxtile_pipeline::memory;
 
@@ -43,7 +43,8 @@ pub fn run(args: &ConvertArgs) -> anyhow::Result<ExitCode> {
     let started = Instant::now();
     let progress = Progress::over_tiles(0);
     let mut conversion = read_map(&args.map, |reader| {
-        let written = convert(reader, whole_map(&args.output)?, args.storage.into(), |done, all| {
+        let scans = if args.drop_scans { CopyScans::No } else { CopyScans::Yes };
+        let written = convert(reader, whole_map(&args.output)?, args.storage.into(), scans, |done, all| {
             progress.set(done, all)
         })?;
         Ok(Conversion::of(args, reader, &written)?)
@@ -72,7 +73,7 @@ impl<'a> Conversion<'a> {
         };
         let WrittenMap { tiles, voxels, occupied, .. } = *written;
         let (scan_number, seconds, peak_rss_bytes) = (reader.scan_number(), 0.0, None);
-        let warnings = warn_of_scans_left([reader]);
+        let warnings = if args.drop_scans { warn_of_scans_left([reader]) } else { Vec::new() };
         Ok(Self { from, to, scan_number, tiles, voxels, occupied, warnings, seconds, peak_rss_bytes })
     }
 

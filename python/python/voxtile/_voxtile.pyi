@@ -461,7 +461,12 @@ def crop(
     progress: _Progress | None = None,
 ) -> dict[str, Any]: ...
 def convert(
-    map: _MapOrSnapshot, output: _Path, storage: _Storage, *, progress: _Progress | None = None
+    map: _MapOrSnapshot,
+    output: _Path,
+    storage: _Storage,
+    *,
+    keep_scans: bool = True,
+    progress: _Progress | None = None,
 ) -> dict[str, Any]: ...
 def import_octree(
     file: _Path, output: _Path, *, storage: _Storage = "octomap", progress: _Progress | None = None

@@ -265,7 +265,17 @@ impl ScanArchive {
     ///
     /// Damage or an I/O error.
     pub fn copy(&mut self, place: SegmentPlace) -> Result<SegmentPlace> {
-        let mut scan = SegmentReader::open(&**self.files.disk(), self.files.layout(), place)?;
+        let layout = self.files.layout().clone();
+        self.copy_from(&layout, place)
+    }
+
+    /// Like [`ScanArchive::copy`], from another map on the same disk.
+    ///
+    /// # Errors
+    ///
+    /// Damage or an I/O error.
+    pub(crate) fn copy_from(&mut self, layout: &Layout, place: SegmentPlace) -> Result<SegmentPlace> {
+        let mut scan = SegmentReader::open(&**self.files.disk(), layout, place)?;
         let (segment, start) = self.open_segment()?;
         let copied = segment.copy(&mut scan);
         self.unsynced.insert(start.segment);
