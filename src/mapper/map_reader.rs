@@ -365,7 +365,7 @@ impl MapReader {
     }
 
     /// Turns damage into [`Error::Changed`] if a writer has flushed since without seeing this reader's lock.
-    pub(super) fn explained<T>(&self, result: Result<T>) -> Result<T> {
+    pub(crate) fn explained<T>(&self, result: Result<T>) -> Result<T> {
         result.map_err(|error| self.explain(error))
     }
 
