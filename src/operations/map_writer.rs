@@ -3,7 +3,7 @@ use crate::error::{Error, Result};
 use crate::mapper::{MapReader, MapView};
 use crate::persistence::{TileSaver, config_from, copy_tile, new_map_id, new_metadata};
 use crate::space::TileIndex;
-use crate::store::{CatalogEntry, Disk, MapPath, Metadata, StagedMap, TileVersion, id_from_hex};
+use crate::store::{CatalogEntry, Disk, MapPath, Metadata, ScanArchive, StagedMap, TileVersion, id_from_hex};
 use crate::tile::Table;
 use serde::Serialize;
 use std::path::Path;
@@ -120,18 +120,34 @@ impl MapWriter {
     /// A damaged or unreadable scan, or an I/O error.
     pub(super) fn keep_scans_of(&mut self, map: &MapReader) -> Result<()> {
         let mut records = map.kept_records()?;
+        self.keep_scans(|archive| {
+            let mut entry = map.explained(records.next_entry())?;
+            if let Some(CatalogEntry::Kept(scan)) = &mut entry {
+                for place in scan.places_mut() {
+                    *place = map.explained(archive.copy_from(map.store().layout(), *place))?;
+                }
+            }
+            Ok(entry)
+        })
+    }
+
+    /// Keeps scans from now on: those that `next` copies to the archive, and whose entries it returns, until it returns
+    /// `None`. Must be called before tiles are added.
+    ///
+    /// # Errors
+    ///
+    /// Those of `next`, or an I/O error.
+    pub(super) fn keep_scans(
+        &mut self,
+        mut next: impl FnMut(&mut ScanArchive) -> Result<Option<CatalogEntry>>,
+    ) -> Result<()> {
         if let Some(ext) = &mut self.metadata.ext {
             ext.keeps_scans = true;
         }
         let archive = self.map.store().archive_mut();
         archive.begin();
         archive.begin_catalog()?;
-        while let Some(mut entry) = map.explained(records.next_entry())? {
-            if let CatalogEntry::Kept(scan) = &mut entry {
-                for place in scan.places_mut() {
-                    *place = map.explained(archive.copy_from(map.store().layout(), *place))?;
-                }
-            }
+        while let Some(entry) = next(archive)? {
             archive.put(&entry)?;
         }
         self.commit()

@@ -1,3 +1,4 @@
+use super::kept_regions::keep_scans_of_regions;
 use super::map_writer::{MapWriter, WrittenMap};
 use super::merge_rule::{MergeRule, Prefer};
 use super::regions::OneBuild;
@@ -28,6 +29,8 @@ pub struct Merged {
     pub is_added: bool,
     /// Whether the maps are regions of one build, which the new map can resume because it has their scans.
     pub is_one_build: bool,
+    /// Whether the new map keeps scans: those of regions of one build that all keep them.
+    pub keeps_scans: bool,
 }
 
 /// Merges maps. A voxel that one map has observed keeps its evidence; for a voxel that several have observed, `prefer`
@@ -41,7 +44,7 @@ pub struct Merged {
 ///
 /// The new map has its own id and no scans, unless the maps are regions of one build
 /// ([`RayConfig::region`](crate::RayConfig)) that together form a box: then the result equals one build of that box,
-/// and can be resumed. The maps must have the same layers, which are combined like the evidence: added, or those of the
+/// can be resumed, and keeps the scans if all maps do. The maps must have the same layers, which are combined like the evidence: added, or those of the
 /// preferred map. The map is created on the disk of the first map, and appears only when it is complete, see
 /// [`MapWriter`]. `progress` receives the number of tiles done and in total.
 ///
@@ -67,6 +70,10 @@ pub fn merge(
     let rule = rule_for(maps, first, prefer)?;
     let one_build = OneBuild::of(maps)?;
     let mut writer = begin(first, output.as_ref(), config, one_build, new_map_id())?;
+    let keeps_scans = one_build.is_some() && maps.iter().all(MapReader::keeps_scans);
+    if let Some(build) = one_build.filter(|_| keeps_scans) {
+        keep_scans_of_regions(&mut writer, maps, build.region)?;
+    }
     let tiles: BTreeSet<TileIndex> = maps.iter().flat_map(MapView::tile_indices).collect();
     let mut merge = TableMerge::new(rule);
     for (done, &tile) in (0..).zip(&tiles) {
@@ -82,6 +89,7 @@ pub fn merge(
         related: related(maps),
         is_added,
         is_one_build: one_build.is_some(),
+        keeps_scans,
     })
 }
 

@@ -26,6 +26,7 @@ mod forget;
 mod import;
 mod join;
 mod kept_bytes;
+mod kept_regions;
 mod map_editor;
 mod map_writer;
 mod merge;

@@ -28,7 +28,8 @@ pub fn run(args: &MergeArgs) -> anyhow::Result<ExitCode> {
     let prefer = args.prefer.map(Into::into);
     let (merged, mut warnings) = read_all_maps(&args.maps, |maps| {
         let merged = merge(maps, whole_map(&args.output)?, prefer, |done, all| progress.set(done, all))?;
-        Ok((merged, warn_of_scans_left(maps)))
+        let warnings = if merged.keeps_scans { Vec::new() } else { warn_of_scans_left(maps) };
+        Ok((merged, warnings))
     })?;
     drop(progress);
     for warning in warnings_of(&args.maps, &merged) {

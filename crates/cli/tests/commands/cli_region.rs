@@ -167,10 +167,51 @@ fn changed_parts_are_no_parts_of_one_build() {
         };
         let before = merged("before");
         assert_eq!(before["is_one_build"], true);
-        // A warning is printed, so that the user does not delete the parts.
-        let warnings = before["warnings"].as_array().unwrap();
-        assert!(warnings.len() == 2 && warnings[0].as_str().unwrap().contains("keeps its scans"), "{before}");
+        assert!(before["keeps_scans"] == true && before["warnings"] == serde_json::json!([]), "{before}");
         change(number, &parts[0], &parts[1]);
-        assert_eq!(merged("after")["is_one_build"], false, "{number}");
+        let after = merged("after");
+        assert!(after["is_one_build"] == false && after["keeps_scans"] == false, "{number}: {after}");
+        // A warning is printed, so that the user does not delete the parts.
+        let warnings = after["warnings"].as_array().unwrap();
+        assert!(warnings.len() == 2 && warnings[0].as_str().unwrap().contains("keeps its scans"), "{after}");
+    }
+}
+
+#[test]
+fn merged_regions_keep_the_scans_of_the_whole_build() {
+    for mode in [&[][..], &["--clearing", "guarded"], &["--storage", "compact"]] {
+        let folder = TempDir::new().unwrap();
+        let scans = scans(&folder);
+        let path = |name: &str| text(&folder.path().join(name)).to_owned();
+        let keep = [mode, &["--keep-scans"]].concat();
+        let (whole, merged) = (path("whole"), path("merged"));
+        output(&build(&scans, &whole, &keep));
+        let parts = ["west", "south_east", "north_east"].map(path);
+        for (part, region) in parts.iter().zip([WEST, SOUTH_EAST, NORTH_EAST]) {
+            output(&build(&scans, part, &[&keep[..], &region].concat()));
+        }
+        let reported = json(&["merge", &parts[0], &parts[1], &parts[2], "-o", &merged, "--json"]);
+        assert!(reported["is_one_build"] == true && reported["keeps_scans"] == true, "{reported}");
+        output(&["verify", &merged]);
+        // The same list of scans, with the same tiles and updates, and the same points.
+        let list = |map: &str| {
+            let mut list = json(&["scans", map, "--json"]);
+            list["map"] = serde_json::Value::Null;
+            list
+        };
+        assert_eq!(list(&merged), list(&whole), "{mode:?}");
+        // Both follow other poses and forget scans alike.
+        let poses = path("poses.txt");
+        let moved = "1 0 0 0.3 0 1 0 -0.2 0 0 1 0.1\n0 -1 0 1 1 0 0 0 0 0 1 0\n1 0 0 2 0 1 0 0 0 0 1 0\n";
+        std::fs::write(&poses, moved).unwrap();
+        for map in [&merged, &whole] {
+            output(&["remap", map, "--poses", &poses]);
+        }
+        assert_eq!(digest(&merged), digest(&whole), "{mode:?}");
+        for map in [&merged, &whole] {
+            output(&["remove-scans", map, "--scans", "2"]);
+        }
+        assert_eq!(digest(&merged), digest(&whole), "{mode:?}");
+        assert_eq!(list(&merged), list(&whole), "{mode:?}");
     }
 }
