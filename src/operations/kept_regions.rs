@@ -55,7 +55,8 @@ fn unite(
         return Ok(());
     }
     let number = entry.as_ref().or(other.as_ref()).and_then(CatalogEntry::numbers).map(|(number, _)| number);
-    let name = number.map_or("an entry after the last scan".to_owned(), |number| format!("kept scan {number}"));
+    let name =
+        number.map_or("an entry after the last scan".to_owned(), |number| format!("kept scan {number}"));
     let reason = format!(
         "its {name} is not the one of {}: build both regions from the same scans",
         first.folder().display()
