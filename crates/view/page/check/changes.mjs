@@ -1,6 +1,7 @@
 import assert from 'node:assert/strict';
 import { mkdirSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
+import { checkSwipe, checkSwipeOfStates } from './swipe.mjs';
 
 // A wall at 5 m; the later map has a box before it, and a second one at the other side instead of the earlier one.
 function scans(work, name, boxes) {
@@ -22,7 +23,8 @@ export async function checkChanges({ browser, view, run, exported, countPixels, 
   const [before, after] = [join(work, 'earlier'), join(work, 'later')];
   const options = ['--resolution', '0.1', '--clearing', 'guarded', '--keep-scans', '-q'];
   run('build', ...scans(work, 'scans-before', [[-1.5, -0.7]]), '-o', before, ...options);
-  run('build', ...scans(work, 'scans-after', [[-0.2, 1.2]]), '-o', after, ...options);
+  const later = scans(work, 'scans-after', [[-0.2, 1.2]]);
+  run('build', ...later, '-o', after, ...options);
   const wanted = JSON.parse(run('compare', before, after, '--json'));
   assert.ok(wanted.appeared.clusters > 0 && wanted.vanished.clusters > 0, JSON.stringify(wanted));
   await browser.open('about:blank');
@@ -81,6 +83,8 @@ export async function checkChanges({ browser, view, run, exported, countPixels, 
     await browser.value('voxtile.detail = 0.1');
     await voxels(exported(map).size);
   }
+  const swipe = await checkSwipe({ browser, maps: [before, after], run, exported });
+  await checkSwipeOfStates({ browser, view, map: before, inputs: later, run, exported });
   assert.deepEqual(browser.errors, []);
-  return `${wanted.changes.length} changes: ${blue} blue and ${orange} orange pixels`;
+  return `${wanted.changes.length} changes: ${blue} blue and ${orange} orange pixels; ${swipe}`;
 }

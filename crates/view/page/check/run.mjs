@@ -90,9 +90,30 @@ async function touch() {
 
 const browser = new Browser();
 ended.push(() => browser.close());
+// Counts the pixels of the map for which a function of red, green and blue holds.
+const count = async (isWanted) => {
+  const { data } = await browser.call('Page.captureScreenshot', { format: 'png' });
+  return browser.value(`(async () => {
+    const image = new Image();
+    image.src = 'data:image/png;base64,${data}';
+    await image.decode();
+    const canvas = new OffscreenCanvas(image.width, image.height);
+    const context = canvas.getContext('2d');
+    context.drawImage(image, 0, 0);
+    const { data } = context.getImageData(0, 0, image.width - 264, image.height);
+    let count = 0;
+    for (let k = 0; k < data.length; k += 4) count += (${isWanted})(data[k], data[k + 1], data[k + 2]);
+    return count;
+  })()`);
+};
+
 let done = 0;
 const step = (text) => console.log(`${++done}. ${text}`);
-try {
+checks: try {
+  if (process.env.ONLY === 'changes') {
+    step(await checkChanges({ browser, view, run, exported, countPixels: count, work }));
+    break checks;
+  }
   const map = join(work, 'room');
   run('build', scan(0), '-o', map, '--resolution', '0.1', '-q');
   const url = await view(map);
@@ -206,21 +227,6 @@ try {
   assert.ok(marked > 0.9 * passing.size);
   await browser.value('document.getElementById("theme").click(); voxtile.lookAt([100, 0.5, 1], [100, 2.5, 0])');
   await browser.ready();
-  const count = async (isWanted) => {
-    const { data } = await browser.call('Page.captureScreenshot', { format: 'png' });
-    return browser.value(`(async () => {
-      const image = new Image();
-      image.src = 'data:image/png;base64,${data}';
-      await image.decode();
-      const canvas = new OffscreenCanvas(image.width, image.height);
-      const context = canvas.getContext('2d');
-      context.drawImage(image, 0, 0);
-      const { data } = context.getImageData(0, 0, image.width - 264, image.height);
-      let count = 0;
-      for (let k = 0; k < data.length; k += 4) count += (${isWanted})(data[k], data[k + 1], data[k + 2]);
-      return count;
-    })()`);
-  };
   const reds = () => count('(r, g, b) => Math.hypot(r - 190, g - 18, b - 24) < 8');
   assert.ok(await reds() > 500, `${await reds()} red pixels`);
   await browser.value('document.getElementById("moving").click()');

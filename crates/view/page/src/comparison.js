@@ -1,7 +1,8 @@
-// Comparison of two maps: the classes that are shown, and the list of changes.
+// Comparison of two maps: what is shown of it, the classes of changes, and their list.
 
 import * as THREE from 'three';
 import { CLASSES } from './palette.js';
+import { sidesOf } from './swipe.js';
 
 const $ = (id) => document.getElementById(id);
 // Maximum number of changes in the list; the buttons reach all that the server sends.
@@ -24,21 +25,27 @@ export class Comparison {
     return this.info !== null && $('compared').value === CHANGES;
   }
 
-  // Returns the maps to show of those in `maps.json`: all without a comparison.
+  // Returns the choice for a link; `null` for the changes.
+  get choice() {
+    return this.info === null || this.isShown ? null : $('compared').value;
+  }
+
+  // Returns the maps to show of those in `maps.json`: all without a comparison, both with their sides in a swipe.
   mapsOf({ maps, comparison }) {
     if (!comparison) return maps;
-    const [before, after] = [maps[comparison.before], maps[comparison.after]];
+    const [before, after] = [comparison.before, comparison.after].map((k) => ({ ...maps[k], snapshots: [] }));
     if (!this.info) {
       this.info = comparison;
-      $('compared').replaceChildren(new Option('changes', CHANGES), new Option(`before: ${before.name}`, 'before'), new Option(`after: ${after.name}`, 'after'));
-      $('compared').value = CHANGES;
+      for (const [choice, { name }] of Object.entries({ before, after })) {
+        $('compared').querySelector(`[value=${choice}]`).text = `${choice}: ${name}`;
+      }
+      this.name = `${before.name} → ${after.name}`;
       [$('comparison').hidden, $('states').hidden] = [false, true];
       this.paintLegend();
       this.load();
     }
-    const shown = $('compared').value;
-    if (shown !== CHANGES) return [shown === 'before' ? before : after];
-    return [{ ...after, name: `${before.name} → ${after.name}`, snapshots: [] }];
+    const changes = { ...after, name: this.name };
+    return { swipe: sidesOf(after, before), before: [before], after: [after] }[$('compared').value] ?? [changes];
   }
 
   // Returns the id of the changes in URLs.

@@ -160,14 +160,15 @@ export class Layer {
       }
     }
     this.updateNear();
-    this.adapt();
   }
 
   // Keeps draw calls and memory within limits by selecting coarser levels; `adapts` is true until the level is stable.
-  adapt() {
+  // `others` have the same level.
+  adapt(others) {
     const { tiles, viewer } = this;
+    const all = [this, ...others];
     const opened = viewer.layers.reduce((sum, layer) => sum + (layer.next ? 2 : 1), 0);
-    for (const one of [tiles, this.next]) {
+    for (const one of all.flatMap((layer) => [layer.tiles, layer.next])) {
       if (!one) continue;
       one.lruCache.maxBytesSize = MOST_BYTES / opened;
       one.lruCache.minBytesSize = 0.75 * one.lruCache.maxBytesSize;
@@ -177,13 +178,17 @@ export class Layer {
     if (view !== this.view) [this.view, this.finest] = [view, BEST_ERROR];
     const before = tiles.errorTarget;
     const share = MOST_DRAWN / viewer.layers.length;
-    const drawn = tiles.visibleTiles.size + this.near.children.length;
-    if (drawn > share || tiles.lruCache.isFull()) {
+    const drawn = Math.max(...all.map((layer) => layer.tiles.visibleTiles.size + layer.near.children.length));
+    if (drawn > share || all.some((layer) => layer.tiles.lruCache.isFull())) {
       tiles.errorTarget = this.finest = Math.min(1.15 * before, MOST_ERROR);
-    } else if (drawn < 0.6 * share && tiles.calm > 0) {
+    } else if (drawn < 0.6 * share && all.every((layer) => layer.tiles.calm > 0)) {
       tiles.errorTarget = Math.max(Math.min(this.finest, before), before / 1.15);
     }
-    this.adapts = tiles.errorTarget !== before;
+    const adapts = tiles.errorTarget !== before;
+    for (const layer of all) {
+      layer.tiles.errorTarget = tiles.errorTarget;
+      layer.adapts = adapts;
+    }
   }
 
   static isIdle(tiles) {

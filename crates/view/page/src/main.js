@@ -9,6 +9,7 @@ import { pointMaterial } from './material.js';
 import { readMoving } from './moving.js';
 import { CHANGES, LAYERS, MOVING, OBSTACLE, drawLegend } from './palette.js';
 import { centerOf, pick } from './pick.js';
+import { Swipe, sidesOf } from './swipe.js';
 import { Viewer } from './viewer.js';
 
 const $ = (id) => document.getElementById(id);
@@ -44,6 +45,7 @@ const swatchOf = (colour) => {
   return swatch;
 };
 const comparison = new Comparison({ viewer, json, say, swatchOf });
+const swipe = new Swipe(viewer, remember);
 let link = readLink();
 let maps = [];
 let tool = 'query';
@@ -81,6 +83,18 @@ const idOf = (map) => {
   return map.id + (at ? `@${at}` : '') + (since ? `~${since}` : '');
 };
 
+const isSwiped = () => maps.length === 1 && $('since').value !== '' && $('swiped').checked;
+
+// Returns the states to show, with their sides in a swipe.
+function states() {
+  if (!isSwiped()) {
+    return maps.map((map) => ({ map, id: map.label ? map.id : idOf(map), side: map.side, label: map.label }));
+  }
+  const [map, at, since] = [maps[0], $('snapshot').value, $('since').value];
+  const later = { map, id: idOf(map).split('~')[0], name: at || 'current' };
+  return sidesOf(later, { map, id: `${map.id}@${since}`, name: since });
+}
+
 function answer(rows) {
   $('answer').replaceChildren(...rows.flatMap(([name, value]) => {
     const [dt, dd] = [document.createElement('dt'), document.createElement('dd')];
@@ -94,9 +108,10 @@ function answer(rows) {
 
 function describe() {
   const map = maps[0];
-  document.title = `${map.name} - voxtile`;
-  $('name').textContent = maps.map((one) => one.name).join(', ');
-  $('layers').replaceChildren(...(maps.length > 1 ? maps : []).map((one, k) => {
+  const name = map.label ? comparison.name : maps.map((one) => one.name).join(', ');
+  document.title = `${map.label ? name : map.name} - voxtile`;
+  $('name').textContent = name;
+  $('layers').replaceChildren(...(maps.length > 1 && !map.label ? maps : []).map((one, k) => {
     const label = document.createElement('label');
     const box = Object.assign(document.createElement('input'), { type: 'checkbox', checked: viewer.layers[k]?.isShown ?? true });
     box.addEventListener('change', () => {
@@ -135,10 +150,11 @@ function allBounds() {
   return { min: end('min', Math.min), max: end('max', Math.max) };
 }
 
-// Reads the occupied extent from the tileset's root, for colours, cuts and the first view.
+// Reads the occupied extent from the tileset's root, for colours, cuts and the first view. Compared maps have a common
+// one, so that equal colours are equal heights.
 async function readExtents() {
   await Promise.all(maps.map(async (map) => {
-    const { root } = await json(`maps/${comparison.isShown ? idOf(map) : map.id}/tileset.json`);
+    const { root } = await json(`maps/${comparison.info ? comparison.id : map.id}/tileset.json`);
     if (!root.children) return;
     const box = root.boundingVolume.box;
     const half = [box[3], box[7], box[11]];
@@ -147,15 +163,24 @@ async function readExtents() {
   }));
 }
 
+// Reads the maps to show after another choice of a comparison.
+async function readCompared() {
+  await readMaps();
+  await readExtents().catch(() => {});
+  viewer.surround(allBounds());
+}
+
 async function showMaps() {
   const number = ++shownNumber;
-  const shown = maps.map((map) => ({ map, id: idOf(map) }));
+  const shown = states();
+  $('swiped-choice').hidden = maps.length > 1 || $('since').value === '';
   viewer.colour = $('colour').value;
   const found = BY_LAYER[viewer.colour] ? await legendOf(shown) : null;
   // Another state was chosen in the meantime.
   if (number !== shownNumber) return;
   legend = found;
   viewer.scaled = false;
+  swipe.show(shown);
   viewer.show(shown, legend);
   viewer.layers.forEach((layer, k) => { layer.isShown = $('layers').querySelectorAll('input')[k]?.checked ?? true; });
   paint();
@@ -354,7 +379,7 @@ function paint() {
   const scale = viewer.layers[0]?.scale ?? { least: 0, most: 3.5 };
   $('threshold-out').value = probabilityOf(logOddsOf(scale, viewer.threshold)).toFixed(3);
   const map = maps[0];
-  const isChange = Boolean($('since').value) || comparison.isShown;
+  const isChange = viewer.layers.some(({ id }) => id.includes('~'));
   $('colours').hidden = comparison.isShown;
   const ends = {
     height: [metres(map.low), metres(map.high)],
@@ -424,6 +449,7 @@ async function ask(layer, node, center) {
     const number = (k, digits) => (k === null ? 'unknown' : k.toFixed(digits));
     const before = comparison.isShown ? await json(`maps/${comparison.info.before}/query?x=${center[0]}&y=${center[1]}&z=${center[2]}`) : null;
     answer([
+      ...(layer.label ? [['map', layer.label]] : []),
       ['at', place(center)],
       ...(before ? [['before', `${before.state}, probability ${number(before.probability, 4)}`], ['after', '']] : []),
       ...(isCoarse ? [['voxel', `of ${metres(node.edge)} (zoom in for single voxels)`]] : []),
@@ -516,18 +542,23 @@ function remember() {
     since: $('since').value,
     cut: CUTS.some((id, k) => $(id).value !== OPEN[k]) ? CUTS.map((id) => Number($(id).value)) : null,
     distances: $('distances').checked ? [Number($('layer').value), Number($('cap').value)] : null,
+    compared: comparison.choice,
+    line: viewer.isSplit ? [viewer.share] : null,
   }));
+}
+
+function chooseOption(id, value) {
+  const select = $(id);
+  select.value = [...select.options].some((option) => option.value === value) ? value : select.options[0].value;
 }
 
 // Sets the controls from a link; unknown colours, snapshots and numbers are ignored.
 function applyLink() {
-  const choose = (id, value) => {
-    const select = $(id);
-    select.value = [...select.options].some((option) => option.value === value) ? value : select.options[0].value;
-  };
-  choose('colour', link.colour);
-  choose('snapshot', link.at ?? '');
-  choose('since', link.since ?? '');
+  chooseOption('colour', link.colour);
+  chooseOption('snapshot', link.at ?? '');
+  chooseOption('since', link.since ?? '');
+  $('swiped').checked = link.line !== null;
+  swipe.move(link.line?.[0] ?? 0.5);
   $('threshold').value = link.threshold ?? 0;
   CUTS.forEach((id, k) => { $(id).value = link.cut?.[k] ?? OPEN[k]; });
   $('distances').checked = link.distances !== null;
@@ -538,8 +569,12 @@ function applyLink() {
   }
 }
 
-window.addEventListener('hashchange', () => {
+window.addEventListener('hashchange', async () => {
   link = readLink();
+  if (comparison.info) {
+    chooseOption('compared', link.compared);
+    await readCompared();
+  }
   applyLink();
   start();
   showMaps();
@@ -580,7 +615,7 @@ async function change() {
   const behind = viewer.layers.filter(isBehind);
   for (const layer of viewer.layers) layer.map = maps.find(({ id }) => id === layer.map.id) ?? layer.map;
   await loadLegend(behind);
-  if (viewer.layers.some((layer) => layer.id !== idOf(layer.map))) {
+  if (states().map(({ id }) => id).join() !== viewer.layers.map(({ id }) => id).join()) {
     // A shown snapshot was deleted.
     showMaps();
   } else {
@@ -684,11 +719,9 @@ $('grid').addEventListener('change', () => {
   else viewer.overlays.set('grid', null);
   viewer.wake();
 });
-for (const id of ['snapshot', 'since']) $(id).addEventListener('change', showMaps);
+for (const id of ['snapshot', 'since', 'swiped']) $(id).addEventListener('change', showMaps);
 $('compared').addEventListener('change', async () => {
-  await readMaps();
-  await readExtents().catch(() => {});
-  viewer.surround(allBounds());
+  await readCompared();
   showMaps();
   cut();
 });
@@ -703,7 +736,7 @@ $('walk').addEventListener('click', () => {
   $('scene').focus();
 });
 $('shot').addEventListener('click', () => {
-  viewer.renderer.render(viewer.scene, viewer.camera);
+  viewer.draw();
   viewer.canvas.toBlob((blob) => {
     const a = Object.assign(document.createElement('a'), { href: URL.createObjectURL(blob), download: `${maps[0]?.name ?? 'map'}.png` });
     a.click();
@@ -800,6 +833,7 @@ window.voxtile = {
   },
   distances: () => distances && { ...distances, values: [...distances.values] },
   clickAt,
+  draw: () => viewer.draw(),
   screenOf(point) {
     const at = viewer.camera.position.clone().set(...viewer.toScene(point)).project(viewer.camera);
     const { left, top, width, height } = $('scene').getBoundingClientRect();
@@ -827,6 +861,7 @@ $('obstacle-swatch').style.background = `rgb(${OBSTACLE})`;
 $('moving-swatch').style.background = `rgb(${MOVING})`;
 if (matchMedia('(max-width: 700px)').matches) showPanel(false);
 try {
+  chooseOption('compared', link.compared);
   await readMaps();
   await readExtents();
   applyLink();

@@ -6,6 +6,10 @@ const line = (points, colour, closed = false) => {
   return closed ? new THREE.LineSegments(geometry, material) : new THREE.Line(geometry, material);
 };
 
+// Layer of three.js with the overlays of the first map; the others belong to all maps.
+export const OF_FIRST_MAP = 1;
+const NAMES_OF_FIRST_MAP = ['path', 'sensor', 'moving', 'distances'];
+
 const EDGES = [[0, 1], [2, 3], [4, 5], [6, 7], [0, 2], [1, 3], [4, 6], [5, 7], [0, 4], [1, 5], [2, 6], [3, 7]];
 
 // Overlays in map coordinates, in metres.
@@ -24,6 +28,7 @@ export class Overlays {
     }
     this.named.delete(name);
     if (!object) return;
+    if (NAMES_OF_FIRST_MAP.includes(name)) object.layers.set(OF_FIRST_MAP);
     this.named.set(name, object);
     this.group.add(object);
   }

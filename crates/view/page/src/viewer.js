@@ -5,7 +5,7 @@ import { BY_LAYER } from './layers.js';
 import { LAYERS } from './palette.js';
 import { sharedUniforms } from './material.js';
 import { KIND } from './node.js';
-import { Overlays } from './overlays.js';
+import { OF_FIRST_MAP, Overlays } from './overlays.js';
 
 const MOST_CALLS = 200;
 // Draw calls reserved for overlays: trajectory, sensor, moving points, distances, marks, change, grid, bounding box.
@@ -18,16 +18,22 @@ export class Viewer {
     this.canvas = canvas;
     this.renderer = new THREE.WebGLRenderer({ canvas, antialias: true });
     this.renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
+    // A frame of a swipe is drawn in two calls.
+    this.renderer.info.autoReset = false;
     this.scene = new THREE.Scene();
     // Scene coordinates are relative to the middle of the maps, which may be millions of metres from the origin.
     this.world = new THREE.Group();
     this.scene.add(this.world);
     this.camera = new THREE.PerspectiveCamera(60, 1, 0.05, 1e6);
     this.camera.up.set(0, 0, 1);
+    this.camera.layers.enable(OF_FIRST_MAP);
     this.flight = new Flight(this.camera, canvas, () => this.wake());
     this.shared = sharedUniforms();
     this.overlays = new Overlays(this.world);
     this.layers = [];
+    // In a swipe, layers of side 0 are drawn left of a share of the width, and layers of side 1 right of it.
+    this.isSplit = false;
+    this.share = 0.5;
     this.shows = { occupied: true, free: false, unknown: false };
     this.threshold = 0;
     // Classes of a comparison that are shown, as bits.
@@ -71,8 +77,11 @@ export class Viewer {
 
   show(maps, legend) {
     for (const layer of this.layers) layer.dispose();
-    this.layers = maps.map(({ map, id }, k) => {
-      const layer = new Layer(this, map, id, maps.length > 1 ? LAYERS[k % LAYERS.length] : null, legend);
+    this.isSplit = maps.some(({ side }) => side !== undefined);
+    const isTinted = maps.length > 1 && !this.isSplit;
+    this.layers = maps.map(({ map, id, side, label }, k) => {
+      const layer = new Layer(this, map, id, isTinted ? LAYERS[k % LAYERS.length] : null, legend);
+      Object.assign(layer, { side, label });
       this.world.add(layer.group);
       return layer;
     });
@@ -106,11 +115,14 @@ export class Viewer {
     const moved = this.flight.update(seconds);
     this.fitDepth();
     for (const layer of this.layers) layer.update();
+    // Equal levels on both sides of a swipe: other levels would look like changes.
+    if (this.isSplit) this.layers[0].adapt(this.layers.slice(1));
+    else for (const layer of this.layers) layer.adapt([]);
     this.paint();
     for (const layer of this.layers) layer.tiles.group.visible = layer.isShown && this.shows.occupied;
     for (const layer of this.layers) layer.near.visible = layer.isShown;
     this.leaveOutFarthest();
-    this.renderer.render(this.scene, this.camera);
+    this.draw();
     this.frames++;
     this.mostCalls = Math.max(this.mostCalls, this.renderer.info.render.calls);
     const meshes = this.layers.reduce((sum, layer) => sum + layer.tiles.visibleTiles.size, 0);
@@ -123,11 +135,44 @@ export class Viewer {
     if (!this.settled) this.waitAWhile(moved);
   }
 
+  // First column of pixels of the later state.
+  get border() {
+    return Math.round(this.share * this.canvas.width);
+  }
+
+  draw() {
+    const { renderer, scene, camera, layers } = this;
+    renderer.info.reset();
+    if (!this.isSplit) {
+      renderer.render(scene, camera);
+      return;
+    }
+    const { border, canvas } = this;
+    const ratio = renderer.getPixelRatio();
+    renderer.setScissorTest(true);
+    for (const [side, from, to] of [[0, 0, border], [1, border, canvas.width]]) {
+      if (from === to) continue;
+      for (const layer of layers) layer.group.visible = layer.side === side;
+      if (layers[0].side === side) camera.layers.enable(OF_FIRST_MAP);
+      else camera.layers.disable(OF_FIRST_MAP);
+      renderer.setScissor(from / ratio, 0, (to - from) / ratio, canvas.height / ratio);
+      renderer.render(scene, camera);
+    }
+    renderer.setScissorTest(false);
+    for (const layer of layers) layer.group.visible = true;
+    camera.layers.enable(OF_FIRST_MAP);
+  }
+
+  // Returns whether a layer is drawn at a place along the screen, from -1 to 1.
+  isAt(layer, x) {
+    return !this.isSplit || layer.side === Number((x + 1) / 2 * this.canvas.width >= this.border);
+  }
+
   // If a view needs more nodes than the limit, hides the farthest until coarser ones are loaded.
   leaveOutFarthest() {
     const near = this.layers.reduce((sum, layer) => sum + (layer.isShown ? layer.near.children.length : 0), 0);
     const shown = this.layers.filter((layer) => layer.isShown).flatMap((layer) => layer.meshes());
-    const most = MOST_CALLS - OVERLAY_CALLS - near;
+    const most = MOST_CALLS - (this.isSplit ? 2 : 1) * OVERLAY_CALLS - near;
     if (shown.length > most) shown.sort((a, b) => a[1].traversal.distanceFromCamera - b[1].traversal.distanceFromCamera);
     shown.forEach(([mesh], k) => { mesh.visible = k < most; });
   }
