@@ -59,8 +59,11 @@ class SwipePage {
     return this.browser.value('document.getElementById("swipe").innerText.replace(/\\s+/g, " ").trim()');
   }
 
-  async press(key) {
-    for (const type of ['keyDown', 'keyUp']) await this.browser.call('Input.dispatchKeyEvent', { type, key, code: key });
+  async press(key, milliseconds = 0) {
+    const send = (type) => this.browser.call('Input.dispatchKeyEvent', { type, key, code: key });
+    await send('keyDown');
+    await new Promise((resolve) => setTimeout(resolve, milliseconds));
+    await send('keyUp');
   }
 
   // Asserts that each side has exactly the pixels of its state alone, and both states differ in both sides.
@@ -155,7 +158,7 @@ export async function checkSwipe({ browser, maps, run, exported }) {
   // In walk mode, keys move the border only, and pointers turn the camera only outside the border.
   await browser.value('document.getElementById("walk").click(); document.getElementById("border").focus()');
   const standing = await camera();
-  await page.press('ArrowRight');
+  await page.press('ArrowUp', 300);
   await page.drag(0.42 * all, 0.5 * all, 500);
   await page.isAt(0.5);
   await browser.until(isReady, 10);
