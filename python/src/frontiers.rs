@@ -67,7 +67,7 @@ impl Frontier {
     /// Center in metres of its voxel nearest to the mean: free space next to the unknown, a goal for a robot.
     #[getter]
     fn goal<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        column(py, self.0.goal_m.unwrap_or(self.0.center_m).to_vec())
+        column(py, self.0.goal_m.to_vec())
     }
 
     fn __repr__(&self) -> String {

@@ -252,6 +252,15 @@ def check_scans(s3, port, bad):
     voxtile("build", "s3://robots/kept", "-o", WORK / "again", "--resolution", 0.5, port=port)
     assert voxtile("digest", WORK / "again", port=port) == digest
 
+    # A comparison reads maps and positions of kept scans from the bucket.
+    compared = [
+        json.loads(voxtile("compare", map, WORK / "one", "--json", port=port))
+        for map in (WORK / "of_folder", "s3://robots/kept")
+    ]
+    assert compared[0]["after"]["hidden"] is not None and compared[0]["before"]["occupied"] > 0, compared[0]
+    for key in ("before", "after", "changes"):
+        assert compared[0][key] == compared[1][key], compared
+
     # The error names the missing keys.
     lacking = {name: value for name, value in environment(port).items() if not name.startswith("AWS_")}
     done = subprocess.run([VOXTILE, "info", "s3://robots/kept"], env=lacking, capture_output=True, text=True, timeout=300)

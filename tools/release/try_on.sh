@@ -81,7 +81,7 @@ result() {
     if ("$1") >"$log" 2>&1; then
         echo ran
     else
-        tail -n 20 "$log" | sed "s/^/$name, $1: /" >&2
+        tail -n 20 "$log" | sed "s|^|$name, $1: |" >&2
         echo "**failed**"
     fi
 }

@@ -71,11 +71,11 @@ fn print(coverage: &Coverage, observations: &Observations, out: &mut impl Write)
     let (voxels, small) = (Counted(coverage.frontier_voxels, "voxel"), HumanCount(coverage.small_frontiers));
     writeln!(out, "frontiers {listed}, and {small} smaller; {voxels} in all")?;
     for frontier in coverage.frontiers.iter().take(MAX_PRINTED) {
-        let [x, y, z] = frontier.center_m;
+        let [x, y, z] = frontier.goal_m;
         let voxels = Counted(frontier.voxels, "voxel");
         writeln!(
             out,
-            "{:>8}  {:.2} m2, {voxels} around {x:.1} {y:.1} {z:.1}",
+            "{:>8}  {:.2} m2, {voxels}, goal {x:.1} {y:.1} {z:.1}",
             frontier.number, frontier.area_m2
         )?;
     }

@@ -6,7 +6,7 @@ use crate::joined::{BlockParts, Cluster, Joined};
 use serde::Serialize;
 use voxtile::mapper::MapView;
 use voxtile::scan::Stop;
-use voxtile::{Aabb, Grid, Point, Result};
+use voxtile::{Aabb, Grid, Point, Result, VoxelIndex};
 
 /// Options of [`frontiers`] and [`frontiers_in`].
 #[derive(Clone, Debug)]
@@ -86,9 +86,7 @@ pub struct Frontier {
     /// Mean of the centers in metres. Its place may be occupied or unknown.
     pub center_m: Point,
     /// Center in metres of its voxel that is nearest to the mean: free space next to the unknown, a goal for a robot.
-    /// `None` unless [`frontiers_in`] has found it.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub goal_m: Option<Point>,
+    pub goal_m: Point,
 }
 
 /// Finds the frontiers of a map: clusters of free voxels next to unknown ones, where exploration can continue.
@@ -105,11 +103,11 @@ pub fn frontiers<V: MapView>(
 ) -> Result<Coverage> {
     let search = &mut FrontierSearch::new(map, options);
     let (mut coverage, clusters) = covered(search, options.min_voxels, progress)?;
-    coverage.frontiers = numbered(&clusters, &map.config().grid);
+    coverage.frontiers = numbered(search, &clusters, &map.config().grid)?;
     Ok(coverage)
 }
 
-/// Finds the frontiers inside a box in metres, with goals: of any map, also of one that is being built
+/// Finds the frontiers inside a box in metres: of any map, also of one that is being built
 /// ([`LiveView`](voxtile::LiveView)).
 ///
 /// Frontiers are those of the voxels whose center is inside; `options.region` is ignored. The cost depends on the box,
@@ -126,7 +124,7 @@ pub fn frontiers<V: MapView>(
 /// let found = frontiers_in(&map, &around, &FrontierOptions::default())?;
 /// assert_eq!(found.len(), 1);
 /// assert!((found[0].area_m2 - 0.41).abs() < 1e-9); // Around a ray of ten voxels, and behind the sensor.
-/// assert!((found[0].goal_m.unwrap()[0] - 0.45).abs() < 1e-9);
+/// assert!((found[0].goal_m[0] - 0.45).abs() < 1e-9);
 /// # Ok(())
 /// # }
 /// ```
@@ -138,9 +136,7 @@ pub fn frontiers_in<V: MapView>(map: &V, region: &Aabb, options: &FrontierOption
     let options = &options.clone().with_region(*region);
     let search = &mut FrontierSearch::new(map, options);
     let (_, clusters) = covered(search, options.min_voxels, &|_, _| {})?;
-    let (goals, grid) = (nearest_to_means(search, &clusters)?, &map.config().grid);
-    let with_goal = |(frontier, goal)| Frontier { goal_m: Some(grid.center_m(goal)), ..frontier };
-    Ok(numbered(&clusters, grid).into_iter().zip(goals).map(with_goal).collect())
+    numbered(search, &clusters, &map.config().grid)
 }
 
 /// Counts voxels, and returns the clusters to list, the largest first.
@@ -178,14 +174,20 @@ fn covered<V: MapView>(
     Ok((coverage, clusters))
 }
 
-fn numbered(clusters: &[Cluster], grid: &Grid) -> Vec<Frontier> {
-    let frontier = |(cluster, number): (&Cluster, u32)| Frontier {
+/// Returns the clusters with their goals, which take a second pass over the blocks of the clusters.
+fn numbered<V: MapView>(
+    search: &mut FrontierSearch<'_, V>,
+    clusters: &[Cluster],
+    grid: &Grid,
+) -> Result<Vec<Frontier>> {
+    let goals = nearest_to_means(search, clusters)?;
+    let frontier = |((cluster, goal), number): ((&Cluster, VoxelIndex), u32)| Frontier {
         number,
         voxels: cluster.sums.voxels,
         area_m2: cluster.sums.faces as f64 * grid.resolution_m().powi(2),
         bounds_m: bounds_m(&cluster.sums, grid),
         center_m: center_m(&cluster.sums, grid),
-        goal_m: None,
+        goal_m: grid.center_m(goal),
     };
-    clusters.iter().zip(1..).map(frontier).collect()
+    Ok(clusters.iter().zip(goals).zip(1..).map(frontier).collect())
 }

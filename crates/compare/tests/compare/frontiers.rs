@@ -5,7 +5,7 @@ use testkit::random_scans::Random;
 use testkit::support::cases;
 use voxtile::VoxelIndex;
 use voxtile::mapper::MapView;
-use voxtile_compare::{FrontierOptions, frontiers};
+use voxtile_compare::{FrontierOptions, frontiers, frontiers_in};
 
 #[test]
 fn frontiers_of_random_maps_equal_the_definition() {
@@ -42,6 +42,7 @@ fn frontiers_of_random_maps_equal_the_definition() {
             assert!(is_same_box(&frontier.bounds_m, &bounds_m(cluster)));
         }
         if let Some(region) = options.region {
+            assert_eq!(found.frontiers, frontiers_in(&map, &region, &options).unwrap());
             let in_box = grid.voxels_in(&region);
             let all: u64 = (0..3).map(|k| (in_box.end[k] - in_box.min[k]) as u64).product();
             assert_eq!(found.voxels_of_box, Some(all));

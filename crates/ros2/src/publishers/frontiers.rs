@@ -107,7 +107,7 @@ fn goals(frontiers: &[Frontier], header: Header) -> PoseArray {
 }
 
 fn goal(frontier: &Frontier) -> [f64; 3] {
-    frontier.goal_m.unwrap_or(frontier.center_m)
+    frontier.goal_m
 }
 
 #[cfg(test)]
