@@ -244,7 +244,7 @@ fn copies_keep_scans_and_can_be_replayed() {
         let whole = MapReader::open(at(&disk), 0).unwrap();
         convert(&whole, place("small"), storage, CopyScans::No, |_, _| ()).unwrap();
         let small = reader(&disk, "small").unwrap();
-        assert!(!small.keeps_scans() && small.scans().unwrap() == whole.scans().unwrap());
+        assert!(!small.keeps_scans() && kept_points(&small).is_empty());
         assert_eq!(small.digest().unwrap(), whole.digest().unwrap());
     }
 }
