@@ -78,7 +78,7 @@ impl Place {
 /// of them wherever the sensor was, or out of view.
 #[pyfunction]
 #[pyo3(signature = (before, after, *, tolerance=None, certainty=0.7, min_voxels=8, region=None,
-    positions=(None, None), memory=None, progress=None))]
+    positions=None, memory=None, progress=None))]
 #[expect(clippy::too_many_arguments, reason = "keywords, in Python")]
 pub fn compare(
     py: Python<'_>,
@@ -88,7 +88,7 @@ pub fn compare(
     certainty: f64,
     min_voxels: u64,
     region: Option<Bound<'_, PyAny>>,
-    positions: (Option<Bound<'_, PyAny>>, Option<Bound<'_, PyAny>>),
+    positions: Option<(Option<Bound<'_, PyAny>>, Option<Bound<'_, PyAny>>)>,
     memory: Option<Bound<'_, PyAny>>,
     progress: Callback,
 ) -> PyResult<Comparison> {
@@ -100,8 +100,9 @@ pub fn compare(
         .with_memory(memory.as_ref().map(bytes_of).transpose()?.unwrap_or(DEFAULT_BYTES));
     let places = [Place::of(py, before)?, Place::of(py, after)?];
     let points_of = |points: &Bound<'_, PyAny>| Ok(Points::of("positions", points)?.slice()?.to_vec());
+    let (of_before, of_after) = positions.unwrap_or_default();
     let positions: [Option<PyResult<Vec<Point>>>; 2] =
-        [positions.0, positions.1].map(|points| points.as_ref().map(points_of));
+        [of_before, of_after].map(|points| points.as_ref().map(points_of));
     let [of_before, of_after] = positions.map(Option::transpose);
     let positions = [of_before?, of_after?];
     watched_with_progress(py, progress, |stop, progress| {

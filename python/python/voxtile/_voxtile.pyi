@@ -35,6 +35,7 @@ __all__ = [
     "delete_snapshot",
     "describe",
     "diff",
+    "forget_old",
     "import_octree",
     "join",
     "merge",
@@ -381,7 +382,7 @@ def compare(
     certainty: float = 0.7,
     min_voxels: int = 8,
     region: ArrayLike | None = None,
-    positions: tuple[ArrayLike | None, ArrayLike | None] = (None, None),
+    positions: tuple[ArrayLike | None, ArrayLike | None] | None = None,
     memory: int | str | None = None,
     progress: _Progress | None = None,
 ) -> Comparison: ...
