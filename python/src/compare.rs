@@ -22,6 +22,8 @@ use voxtile_pipeline::{ComparedMap, change_features, check_crs, class_code, warn
 const DEFAULT_BYTES: usize = 256 << 20;
 
 type Voxels<'py> = (Bound<'py, PyArray2<f64>>, Bound<'py, PyArray1<u8>>);
+/// Positions of the sensors of both maps: arrays of N x 3.
+type PositionsOfBoth<'py> = (Option<Bound<'py, PyAny>>, Option<Bound<'py, PyAny>>);
 /// Centers in metres and classes.
 type Collected = (Vec<Point>, Vec<u8>);
 
@@ -88,7 +90,7 @@ pub fn compare(
     certainty: f64,
     min_voxels: u64,
     region: Option<Bound<'_, PyAny>>,
-    positions: Option<(Option<Bound<'_, PyAny>>, Option<Bound<'_, PyAny>>)>,
+    positions: Option<PositionsOfBoth<'_>>,
     memory: Option<Bound<'_, PyAny>>,
     progress: Callback,
 ) -> PyResult<Comparison> {
