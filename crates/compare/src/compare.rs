@@ -149,7 +149,7 @@ impl<'a, A: MapView, B: MapView> Comparer<'a, A, B> {
         [later, earlier].map(|hidden| EpochCounts { hidden, ..EpochCounts::default() })
     }
 
-    /// Whether it is known what was hidden from the sensors of the earlier and of the later map.
+    /// Whether the positions of the earlier and of the later map's sensor are known, which hidden voxels need.
     fn is_hidden_known(&self) -> [bool; 2] {
         [0, 1].map(|k| self.options.viewpoints[k].is_some())
     }

@@ -2,7 +2,7 @@ use rustc_hash::FxHashMap;
 use std::sync::Arc;
 use voxtile::{Aabb, Error, Point, Result};
 
-/// Positions of a map's sensor, which decide what was hidden and what was out of view.
+/// Positions of a map's sensor. A voxel is hidden if something is between it and all near positions.
 ///
 /// Of positions close together, one is kept: each cube of a twentieth of the range keeps the one with the lowest
 /// coordinates. So a long trajectory takes little memory.
