@@ -267,6 +267,12 @@ impl OutOfCoreTileMapper {
         self.pager().is_dirty(tile)
     }
 
+    /// Numbers the next scan as if `count` other scans preceded it, because a shard numbers all scans of its build
+    /// ([`join`](crate::operations::join())).
+    pub fn skip_scans(&mut self, count: u64) {
+        self.pager().skip_scans(count);
+    }
+
     /// Returns the tiles that evictions and flushes have written since the last call, in order. Failed writes are
     /// omitted.
     pub fn take_saved_tiles(&mut self) -> Vec<TileIndex> {

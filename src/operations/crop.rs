@@ -1,7 +1,9 @@
+use super::convert::CopyScans;
 use super::map_writer::{MapWriter, WrittenMap};
 use super::part::{AreaPart, Part, Share, VoxelPart};
+use super::scans_of_part::keep_scans_of_part;
 use super::table_change::voxels_of_part;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::mapper::{MapReader, MapView};
 use crate::persistence::{new_map_id, new_metadata};
 use crate::store::{MapPath, Metadata, UnsyncedDisk};
@@ -14,17 +16,23 @@ use std::sync::Arc;
 /// build cannot be resumed on it, because it lacks a part of the scans. It appears only when it is complete, see
 /// [`MapWriter`]. `progress` receives the number of tiles done and in total.
 ///
+/// With [`CopyScans::Yes`] a map that keeps its scans keeps those that changed a tile of the part, with all their points.
+/// They are mapped only into the tiles around the part from then on, but into these whole: a remap also restores
+/// the voxels of its outer tiles that are not in the part.
+///
 /// # Errors
 ///
-/// An invalid box, a damaged tile, an output with other content, or an I/O error.
+/// An invalid box, a damaged tile or kept scan, kept scans of all other voxels, an output with other content, or an I/O
+/// error.
 pub fn crop(
     map: &MapReader,
     part: &Part,
+    scans: CopyScans,
     output: impl AsRef<Path>,
     progress: impl FnMut(u64, u64),
 ) -> Result<WrittenMap> {
     let part = part.voxels(&map.config().grid)?;
-    crop_to(map, &part, MapPath::on(map.disk(), output), new_map_id(), progress)
+    crop_to(map, &part, scans, MapPath::on(map.disk(), output), new_map_id(), progress)
 }
 
 /// Like [`crop`], for a part of space over an area. Tiles outside of the area are not read, unless the part is all other
@@ -36,11 +44,12 @@ pub fn crop(
 pub fn crop_area(
     map: &MapReader,
     part: &AreaPart,
+    scans: CopyScans,
     output: impl AsRef<Path>,
     progress: impl FnMut(u64, u64),
 ) -> Result<WrittenMap> {
     let part = part.voxels(&map.config().grid)?;
-    crop_to(map, &part, MapPath::on(map.disk(), output), new_map_id(), progress)
+    crop_to(map, &part, scans, MapPath::on(map.disk(), output), new_map_id(), progress)
 }
 
 /// Like [`crop`], for a shard of a future map with the id `map_id` ([`move_shard`](super::move_shard())). The shard is
@@ -58,12 +67,13 @@ pub fn crop_shard(
 ) -> Result<WrittenMap> {
     let disk = Arc::new(UnsyncedDisk::of(map.disk()));
     let part = part.voxels(&map.config().grid)?;
-    crop_to(map, &part, MapPath::on(disk, output), map_id, progress)
+    crop_to(map, &part, CopyScans::No, MapPath::on(disk, output), map_id, progress)
 }
 
 fn crop_to(
     map: &MapReader,
     part: &VoxelPart,
+    scans: CopyScans,
     output: MapPath,
     map_id: [u8; 16],
     mut progress: impl FnMut(u64, u64),
@@ -71,7 +81,16 @@ fn crop_to(
     let grid = map.config().grid;
     let (disk, output) = output.into_parts();
     let mut writer = MapWriter::create_as(disk, &output, metadata_of_part(map, map_id))?;
-    writer.take_scans_of(map)?;
+    match scans {
+        CopyScans::Yes if map.keeps_scans() => {
+            let tiles = part.tiles(&grid).ok_or_else(|| {
+                let reason = "the scans cannot be limited to all voxels outside: crop a box or polygon, or copy no scans";
+                Error::argument("scans", reason)
+            })?;
+            keep_scans_of_part(&mut writer, map, tiles)?;
+        }
+        _ => writer.take_scans_of(map)?,
+    }
     let mut tiles = map.tile_indices();
     tiles.retain(|&tile| part.share_of(&grid.voxels_of_tile(tile)) != Share::Nothing);
     for (done, &tile) in (0..).zip(&tiles) {

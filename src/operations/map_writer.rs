@@ -147,9 +147,12 @@ impl MapWriter {
         let archive = self.map.store().archive_mut();
         archive.begin();
         archive.begin_catalog()?;
+        let mut last = 0;
         while let Some(entry) = next(archive)? {
             archive.put(&entry)?;
+            last = entry.numbers().map_or(last, |(_, last)| last);
         }
+        self.scan_number = self.scan_number.max(last);
         self.commit()
     }
 

@@ -1,8 +1,9 @@
-use super::kept_regions::keep_scans_of_regions;
+use super::appended_scans::append_scans;
 use super::map_writer::{MapWriter, WrittenMap};
 use super::merge_rule::{MergeRule, Prefer};
 use super::regions::OneBuild;
 use super::table_merge::TableMerge;
+use super::united_scans::{Part, unite_scans};
 use crate::config::MapConfig;
 use crate::error::{Error, Result, beginning_or_difference};
 use crate::mapper::{MapReader, MapView, TileRef};
@@ -29,7 +30,7 @@ pub struct Merged {
     pub is_added: bool,
     /// Whether the maps are regions of one build, which the new map can resume because it has their scans.
     pub is_one_build: bool,
-    /// Whether the new map keeps scans: those of regions of one build that all keep them.
+    /// Whether the new map keeps the scans of all maps.
     pub keeps_scans: bool,
 }
 
@@ -42,11 +43,12 @@ pub struct Merged {
 /// on earlier evidence in the same map. Maps without a common tile need neither this nor `prefer`. With `prefer` the
 /// sensor models may differ. Sensor model, occupancy threshold and storage are those of the first map.
 ///
-/// The new map has its own id and no scans, unless the maps are regions of one build
-/// ([`RayConfig::region`](crate::RayConfig)) that together form a box: then the result equals one build of that box,
-/// can be resumed, and keeps the scans if all maps do. The maps must have the same layers, which are combined like the evidence: added, or those of the
-/// preferred map. The map is created on the disk of the first map, and appears only when it is complete, see
-/// [`MapWriter`]. `progress` receives the number of tiles done and in total.
+/// The new map has its own id. If the maps are regions of one build ([`RayConfig::region`](crate::RayConfig)) that
+/// together form a box, the result equals one build of that box and can be resumed. If all maps keep their scans, the
+/// new map keeps those of regions, or of unrelated maps one after the other if their evidence is added or they have no
+/// common tile; else it has no scans. The maps must have the same layers, which are combined like the evidence: added,
+/// or those of the preferred map. The map is created on the disk of the first map, and appears only when it is complete,
+/// see [`MapWriter`]. `progress` receives the number of tiles done and in total.
 ///
 /// # Errors
 ///
@@ -70,9 +72,19 @@ pub fn merge(
     let rule = rule_for(maps, first, prefer)?;
     let one_build = OneBuild::of(maps)?;
     let mut writer = begin(first, output.as_ref(), config, one_build, new_map_id())?;
-    let keeps_scans = one_build.is_some() && maps.iter().all(MapReader::keeps_scans);
-    if let Some(build) = one_build.filter(|_| keeps_scans) {
-        keep_scans_of_regions(&mut writer, maps, build.region)?;
+    let related = related(maps);
+    let is_added = matches!(rule, MergeRule::Add { .. });
+    let are_all_kept = maps.iter().all(MapReader::keeps_scans);
+    // Otherwise the evidence is not that of all scans.
+    let is_of_all_scans =
+        one_build.is_some() || related.is_empty() && (is_added || have_no_common_tile(maps));
+    let keeps_scans = are_all_kept && is_of_all_scans;
+    match one_build {
+        Some(build) if keeps_scans => {
+            unite_scans(&mut writer, maps.iter().map(Part::open).collect(), build.region, true)?;
+        }
+        None if keeps_scans => append_scans(&mut writer, maps)?,
+        _ => {}
     }
     let tiles: BTreeSet<TileIndex> = maps.iter().flat_map(MapView::tile_indices).collect();
     let mut merge = TableMerge::new(rule);
@@ -82,11 +94,10 @@ pub fn merge(
     }
     progress(tiles.len() as u64, tiles.len() as u64);
     let written = writer.finish()?;
-    let is_added = matches!(rule, MergeRule::Add { .. });
     Ok(Merged {
         written,
         common_voxels: merge.common,
-        related: related(maps),
+        related,
         is_added,
         is_one_build: one_build.is_some(),
         keeps_scans,

@@ -4,6 +4,7 @@
 //! tables, in tile order -> MapWriter -> MAP.unfinished -> MAP
 //! merge   k readers, one tile index at a time -> MapWriter
 //! crop    one reader -> MapWriter
+//! scans_of_part, united_scans, appended_scans   the kept scans of a part, of parts of one build, of maps -> MapWriter
 //! import  a file of OctoMap -> MapWriter
 //! make_shard, move_shard   a map -> a shard of a future map, by copying or moving
 //! join    shards -> MapWriter, by hard links
@@ -17,6 +18,7 @@
 //!
 //! `docs/life_of_a_map.md` describes their purpose and rules.
 
+mod appended_scans;
 mod clear;
 mod convert;
 mod crop;
@@ -26,7 +28,6 @@ mod forget;
 mod import;
 mod join;
 mod kept_bytes;
-mod kept_regions;
 mod map_editor;
 mod map_writer;
 mod merge;
@@ -36,10 +37,12 @@ mod regions;
 mod remapping;
 mod replace_tiles;
 mod revert;
+mod scans_of_part;
 mod shard;
 mod snapshot;
 mod table_change;
 mod table_merge;
+mod united_scans;
 
 pub use clear::{Cleared, clear};
 pub use convert::{CopyScans, convert};

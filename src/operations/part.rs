@@ -1,7 +1,7 @@
 use crate::error::{Error, Result};
 use crate::space::{
-    Aabb, Area, BRICK_EDGE, BrickMask, ColumnMask, Grid, VoxelBox, VoxelIndex, add_to_mask, mask_of_box,
-    place_of_voxel,
+    Aabb, Area, BRICK_EDGE, BrickMask, ColumnMask, Grid, TileBox, VoxelBox, VoxelIndex, add_to_mask,
+    mask_of_box, place_of_voxel,
 };
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -159,6 +159,23 @@ impl VoxelPart {
     /// Returns the complement of the part.
     pub(super) fn rest(&self) -> Self {
         Self { is_outside: !self.is_outside, ..self.clone() }
+    }
+
+    /// The tiles with a voxel of the bounding box of the part; `None` for all voxels outside of a box or area.
+    pub(super) fn tiles(&self, grid: &Grid) -> Option<TileBox> {
+        let voxels = match &self.shape {
+            _ if self.is_outside => return None,
+            Shape::Box(voxels) => *voxels,
+            Shape::Area(over) => {
+                let [[west, south], [east, north]] = over.area.bounds_m();
+                let (min, max) =
+                    ([west, south, f64::NEG_INFINITY], [east.next_up(), north.next_up(), f64::INFINITY]);
+                over.heights.intersection(&grid.voxels_in(&Aabb { min, max }))
+            }
+        };
+        let highest = voxels.end.map(|end| end - 1);
+        (!voxels.is_empty())
+            .then(|| TileBox::new(grid.tile_of_voxel(voxels.min), grid.tile_of_voxel(highest)))
     }
 
     pub(super) fn share_of(&self, tile: &VoxelBox) -> Share {

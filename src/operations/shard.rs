@@ -8,8 +8,8 @@ use std::path::Path;
 ///
 /// [`join`](super::join()) combines shards with one id and without common tiles to a map, without reading their tiles.
 /// Therefore this function compares every byte with the map's log, and the shard is durable when it returns. Tables are
-/// not decoded. The tiles get scan number 0, because the future map may number scans differently. `progress` receives
-/// the number of tiles done and in total.
+/// not decoded. The tiles get scan number 0, because the future map may number scans differently. A shard of a map that
+/// keeps its scans keeps them too. `progress` receives the number of tiles done and in total.
 ///
 /// # Errors
 ///
@@ -29,7 +29,10 @@ pub fn make_shard(
     };
     ext.map_id = hex(&map_id);
     let mut writer = MapWriter::create_as(map.disk(), output.as_ref(), metadata)?;
-    writer.take_scans_of(map)?;
+    match map.keeps_scans() {
+        true => writer.keep_scans_of(map)?,
+        false => writer.take_scans_of(map)?,
+    }
     let tiles = map.tile_indices();
     for (done, &tile) in (0..).zip(&tiles) {
         progress(done, tiles.len() as u64);
@@ -58,7 +61,7 @@ pub fn move_shard(
 ) -> Result<WrittenMap> {
     let (disk, folder) = map.into().into_parts();
     let map = MapReader::open(MapPath::on(disk.clone(), &folder), 0)?;
-    if map.map_id() != Some(map_id) || map.keeps_scans() {
+    if map.map_id() != Some(map_id) {
         return make_shard(&map, output, map_id, progress);
     }
     let mut written = WrittenMap::default();

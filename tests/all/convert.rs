@@ -127,7 +127,7 @@ fn copies_of_a_map_with_outdated_metadata_have_all_scans() {
     disk.put(&metadata, &behind);
     converted(&disk, "map", "small", Storage::Compact).unwrap();
     let everywhere = Part::Inside(Aabb { min: [-50.0; 3], max: [50.0; 3] });
-    crop(&reader(&disk, "map").unwrap(), &everywhere, place("part"), |_, _| ()).unwrap();
+    crop(&reader(&disk, "map").unwrap(), &everywhere, CopyScans::No, place("part"), |_, _| ()).unwrap();
     for made in ["map", "small", "part"] {
         assert_eq!(reader(&disk, made).unwrap().scan_number(), 1, "{made}");
     }

@@ -249,7 +249,7 @@ fn operations_keep_add_and_drop_layers() {
         let center = center(voxel);
         (0..3).all(|k| region.min[k] <= center[k] && center[k] < region.max[k])
     };
-    crop(&open("a"), &Part::Inside(region), path("cropped"), |_, _| {}).unwrap();
+    crop(&open("a"), &Part::Inside(region), CopyScans::No, path("cropped"), |_, _| {}).unwrap();
     let expected: LayerSums = a.clone().into_iter().filter(|(voxel, _)| is_in(voxel)).collect();
     assert!(layers_of(&open("cropped")) == expected);
     clear(at(&folder, "b"), &Part::Inside(region), |_, _| {}).unwrap();

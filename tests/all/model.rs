@@ -11,7 +11,7 @@ use testkit::reference_map::{ReferenceMap, Voxels, voxels_of};
 use testkit::support::cases;
 use testkit::unsynced_disk::UnsyncedDisk;
 use voxtile::integrity::verify;
-use voxtile::operations::{Part, Prefer, clear, crop, delete_snapshot, merge, revert, snapshots};
+use voxtile::operations::{CopyScans, Part, Prefer, clear, crop, delete_snapshot, merge, revert, snapshots};
 use voxtile::sensor::{Iwlo, SensorModel};
 use voxtile::store::TileStore;
 use voxtile::{
@@ -177,7 +177,7 @@ fn check_derived_maps(
     let content_of =
         |name: &str| Content::of_map(&MapReader::open(at(&folder.path().join(name)), 0).unwrap(), 0);
 
-    crop(&map, &Part::Inside(*region), folder.path().join("cropped"), |_, _| ()).unwrap();
+    crop(&map, &Part::Inside(*region), CopyScans::No, folder.path().join("cropped"), |_, _| ()).unwrap();
     let mut cropped = Content { scans: 0, ..now.clone() };
     cropped.retain(|voxel| is_in(&config, region, voxel));
     assert_eq!(content_of("cropped"), cropped, "{what}");

@@ -143,6 +143,10 @@ fn build_input(
         return Ok(None);
     };
 
+    if options.piece_of.is_some() && mapper.config().keeps_scans {
+        // A shard numbers the scans of the whole build.
+        mapper.skip_scans(options.read.selection.first.saturating_sub(mapper.scan_number()));
+    }
     if options.when_behind != WhenBehind::Wait {
         ingest.read_ahead(ScanQueue::new(options.when_behind, ScanQueue::MAX_SCANS));
     } else if max_batch > 1 {

@@ -19,21 +19,28 @@ mod subscribe;
 
 use args::{Args, Mode};
 use clap::{CommandFactory, Parser};
-use std::process::ExitCode;
+use std::io::Write;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
-fn main() -> ExitCode {
-    let args = Args::parse();
-    match run(&args) {
-        Ok(()) => ExitCode::SUCCESS,
+fn main() {
+    let code = exit_code(&Args::parse());
+    // Ignore a failure, because standard output may be closed.
+    let _ = std::io::stdout().flush();
+    // Threads of the network still run. End without the destructors of global values, which they may use.
+    signal_hook::low_level::exit(code)
+}
+
+fn exit_code(args: &Args) -> i32 {
+    match run(args) {
+        Ok(()) => 0,
         Err(error) => {
             output::report(format_args!("{error:#}"));
             if args.json {
                 // Ignore a failure, because standard output may be closed.
                 let _ = json::print(&json::failure(&error));
             }
-            ExitCode::from(if error.is::<voxtile::Error>() { 2 } else { 1 })
+            if error.is::<voxtile::Error>() { 2 } else { 1 }
         }
     }
 }

@@ -184,6 +184,15 @@ impl TilePager<'_> {
         self.disk.note(CatalogEntry::Unlisted(number, number));
     }
 
+    /// Numbers the next scan as if so many others preceded it, which are in other parts of the map's build.
+    pub(in crate::mapper) fn skip_scans(&mut self, count: u64) {
+        let before = self.contents.scan_number;
+        if count > 0 {
+            self.contents.scan_number = before + count;
+            self.disk.note(CatalogEntry::Unlisted(before + 1, before + count));
+        }
+    }
+
     /// Sets the number of the last scan; the next scan gets the following number.
     pub(in crate::mapper) fn set_scan_number(&mut self, number: u64) {
         self.contents.scan_number = number;

@@ -57,7 +57,13 @@ fn sync_map(disk: &dyn Disk, layout: &Layout, tiles: &[TileIndex]) -> Result<()>
     if disk.kind_at(&layout.scans())?.is_some() {
         own.push(layout.scans());
     }
-    sync_paths(disk, &own, &[])?;
+    let kept_scans = layout.kept_scans();
+    let keeps_scans = disk.kind_at(&kept_scans)?.is_some();
+    if keeps_scans {
+        let names = disk.list(&kept_scans).map_err(|error| Error::io(&kept_scans, "list", error))?;
+        own.extend(names.iter().map(|name| kept_scans.join(name)));
+    }
+    sync_paths(disk, &own, if keeps_scans { std::slice::from_ref(&kept_scans) } else { &[] })?;
     for tiles in tiles.chunks(TILES_SYNCED_AT_ONCE) {
         let files = tiles.iter().flat_map(|&tile| layout.files().iter().map(move |&file| (tile, file)));
         let files: Vec<_> = files.map(|(tile, file)| layout.current(tile, file)).collect();

@@ -123,6 +123,21 @@ impl CatalogEntry {
         }
     }
 
+    /// The entry with numbers after this one, which was 0 before.
+    #[must_use]
+    pub(crate) fn after(mut self, number: u64) -> Self {
+        match &mut self {
+            Self::Kept(scan) => scan.number += number,
+            Self::Listed(scan) => scan.number += number,
+            Self::Unlisted(first, last) | Self::Removed(first, last) => {
+                *first += number;
+                *last += number;
+            }
+            Self::Operation(_) => {}
+        }
+        self
+    }
+
     /// Approximate heap memory in bytes.
     pub(super) fn heap_bytes(&self) -> usize {
         match self {

@@ -2,7 +2,7 @@ use super::random_maps::{config, disk, open, path, random_voxels, read_map, writ
 use testkit::random_scans::Random;
 use testkit::reference_map::Voxels;
 use voxtile::mapper::MapView;
-use voxtile::operations::{AreaPart, Part, Prefer, clear, crop, crop_area, merge};
+use voxtile::operations::{AreaPart, CopyScans, Part, Prefer, clear, crop, crop_area, merge};
 use voxtile::space::{Aabb, Area, VoxelBox};
 use voxtile::{Error, MapConfig, MapPath, MapQueries, MapReader};
 
@@ -44,15 +44,22 @@ fn crop_and_clear_are_filters_and_crops_merge_to_the_whole() {
         let whole = MapReader::open(MapPath::on(disk.shared(), path("whole")), 0).unwrap().digest().unwrap();
         let region = random_box(&mut random);
         if config.grid.voxels_in(&region).is_empty() {
-            let refused =
-                crop(&open(&disk, &path("whole")).unwrap(), &Part::Outside(region), path("none"), |_, _| {});
+            let refused = crop(
+                &open(&disk, &path("whole")).unwrap(),
+                &Part::Outside(region),
+                CopyScans::No,
+                path("none"),
+                |_, _| {},
+            );
             assert!(matches!(refused, Err(Error::InvalidArgument { .. })), "seed {seed}");
             continue;
         }
         let parts = [(Part::Inside(region), "inside"), (Part::Outside(region), "outside")];
         for (part, name) in parts {
             let expected = naive(&config, &voxels, &part);
-            let written = crop(&open(&disk, &path("whole")).unwrap(), &part, path(name), |_, _| {}).unwrap();
+            let written =
+                crop(&open(&disk, &path("whole")).unwrap(), &part, CopyScans::No, path(name), |_, _| {})
+                    .unwrap();
             assert_eq!(read_map(&disk, &path(name)), expected, "seed {seed}, {name}");
             assert_eq!(written.voxels, expected.len() as u64);
             cut_through += u64::from(!expected.is_empty() && expected.len() < voxels.len());
@@ -86,7 +93,14 @@ fn a_crop_keeps_the_scan_number_and_gets_a_new_id() {
     let config = config(&mut random);
     write_map(&disk, &path("whole"), &config, &random_voxels(&mut random, 50));
     let everywhere = Aabb { min: [f64::NEG_INFINITY; 3], max: [f64::INFINITY; 3] };
-    crop(&open(&disk, &path("whole")).unwrap(), &Part::Inside(everywhere), path("part"), |_, _| {}).unwrap();
+    crop(
+        &open(&disk, &path("whole")).unwrap(),
+        &Part::Inside(everywhere),
+        CopyScans::No,
+        path("part"),
+        |_, _| {},
+    )
+    .unwrap();
     let [whole, part] = ["whole", "part"].map(|name| open(&disk, &path(name)).unwrap());
     assert_eq!(whole.digest().unwrap(), part.digest().unwrap());
     let id_of = |reader: &MapReader| reader.metadata().ext.as_ref().unwrap().map_id.clone();
@@ -102,7 +116,8 @@ fn an_empty_box_is_an_error() {
         [Aabb { min: [0.0; 3], max: [1.0, 0.0, 1.0] }, Aabb { min: [0.0, f64::NAN, 0.0], max: [1.0; 3] }]
     {
         for part in [Part::Inside(region), Part::Outside(region)] {
-            let cropped = crop(&open(&disk, &path("whole")).unwrap(), &part, path("part"), |_, _| {});
+            let cropped =
+                crop(&open(&disk, &path("whole")).unwrap(), &part, CopyScans::No, path("part"), |_, _| {});
             assert!(matches!(cropped, Err(Error::InvalidArgument { .. })));
             let cleared = clear(MapPath::on(disk.shared(), path("whole")), &part, |_, _| {});
             assert!(matches!(cleared, Err(Error::InvalidArgument { .. })));
@@ -120,7 +135,8 @@ fn a_map_cannot_be_created_inside_another() {
     let before = disk.files();
     let everything = Part::Inside(Aabb { min: [-1e3; 3], max: [1e3; 3] });
     for inside in ["whole/tile_0_0_90", "whole/snapshots/x"] {
-        let refused = crop(&open(&disk, &path("whole")).unwrap(), &everything, path(inside), |_, _| {});
+        let refused =
+            crop(&open(&disk, &path("whole")).unwrap(), &everything, CopyScans::No, path(inside), |_, _| {});
         assert!(matches!(refused, Err(Error::InvalidArgument { .. })), "{inside}: {refused:?}");
     }
     assert_eq!(disk.files(), before);
@@ -161,7 +177,8 @@ fn crops_by_areas_are_filters() {
             .map(|(&voxel, &found)| (voxel, found))
             .collect();
         let written =
-            crop_area(&open(&disk, &path("whole")).unwrap(), &part, path("part"), |_, _| {}).unwrap();
+            crop_area(&open(&disk, &path("whole")).unwrap(), &part, CopyScans::No, path("part"), |_, _| {})
+                .unwrap();
         assert_eq!(read_map(&disk, &path("part")), expected, "seed {seed}");
         assert_eq!(written.voxels, expected.len() as u64);
         cut_through += u64::from(!expected.is_empty() && expected.len() < voxels.len());
@@ -177,7 +194,8 @@ fn areas_without_a_height_of_a_voxel_are_refused() {
     write_map(&disk, &path("whole"), &config, &random_voxels(&mut random, 10));
     for z_m in [[1.0, 1.0], [2.0, 1.0], [f64::NAN, 1.0], [0.0, f64::NAN]] {
         let part = AreaPart { z_m, is_outside: false, ..random_prism(&mut random) };
-        let refused = crop_area(&open(&disk, &path("whole")).unwrap(), &part, path("none"), |_, _| {});
+        let refused =
+            crop_area(&open(&disk, &path("whole")).unwrap(), &part, CopyScans::No, path("none"), |_, _| {});
         assert!(matches!(refused, Err(Error::InvalidArgument { .. })), "{z_m:?}");
     }
 }

@@ -3,7 +3,7 @@ use crate::harness::{EVERY_CRASH, Job, Left, faults, make_foreign, sweep};
 use std::sync::Arc;
 use testkit::faulty_disk::{Fault, FaultyDisk};
 use testkit::random_scans::{Random, random_scan};
-use voxtile::operations::{self, Decay, Part};
+use voxtile::operations::{self, CopyScans, Decay, Part};
 use voxtile::scan::Stop;
 use voxtile::space::Aabb;
 use voxtile::store::{TileStore, UnsyncedDisk};
@@ -40,7 +40,8 @@ fn merge(disk: &FaultyDisk) -> Result<()> {
 }
 
 fn crop(disk: &FaultyDisk) -> Result<()> {
-    operations::crop(&open(disk, &path("a"))?, &Part::Inside(region()), path("out"), |_, _| {}).map(drop)
+    operations::crop(&open(disk, &path("a"))?, &Part::Inside(region()), CopyScans::No, path("out"), |_, _| {})
+        .map(drop)
 }
 
 const ID: [u8; 16] = [7; 16];
@@ -90,7 +91,8 @@ fn two_shards(storage: Storage) -> FaultyDisk {
     // The upper bound along x is a border between tiles.
     let west = Aabb { min: [-100.0; 3], max: [3.2, 100.0, 100.0] };
     for (name, part) in [("inside", Part::Inside(west)), ("outside", Part::Outside(west))] {
-        operations::crop(&open(&disk, &path("a")).unwrap(), &part, path("crop"), |_, _| {}).unwrap();
+        operations::crop(&open(&disk, &path("a")).unwrap(), &part, CopyScans::No, path("crop"), |_, _| {})
+            .unwrap();
         operations::make_shard(&open(&disk, &path("crop")).unwrap(), path(name), ID, |_, _| {}).unwrap();
         disk.take(&path("crop"));
     }

@@ -14,3 +14,5 @@ mod merge;
 mod random_maps;
 /// Replacement of tiles compared with a naive map; incompatible parts are errors.
 mod replace_tiles;
+/// Kept scans of joined shards, merged maps and cropped maps, compared with one build.
+mod scans_of_parts;

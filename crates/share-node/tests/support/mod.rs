@@ -107,13 +107,14 @@ pub fn layers_and_success(subscriber: &mut Process) -> (Vec<Layer>, bool) {
 pub fn summaries_and_success(subscriber: &mut Process) -> (Vec<Value>, bool) {
     let mut out = String::new();
     subscriber.0.stdout.as_mut().unwrap().read_to_string(&mut out).unwrap();
-    let is_success = subscriber.0.wait().unwrap().success();
+    let status = subscriber.0.wait().unwrap();
     let mut lines: Vec<Value> = out.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
     assert!(lines.iter().all(|line| line["version"] == 1));
-    if !is_success {
-        assert_eq!(lines.pop().unwrap()["error"]["kind"], "other");
+    if !status.success() {
+        let error = lines.pop().unwrap_or_else(|| panic!("{status} without an error"));
+        assert_eq!(error["error"]["kind"], "other", "{error}");
     }
-    (lines, is_success)
+    (lines, status.success())
 }
 
 pub fn run(args: &[&str]) -> Output {
