@@ -65,7 +65,8 @@ mod _voxtile {
     #[pymodule_export]
     use super::operations::{
         clear, convert, crop, decay, default_tile_size, delete_snapshot, describe, diff, forget_old,
-        import_octree, join, merge, move_shard, repair, replace_tiles, revert, snapshots, verify,
+        import_octree, join, merge, move_shard, repair, replace_tiles, revert, scan_digest, snapshots,
+        verify,
     };
     #[pymodule_export]
     use super::remapping::{clean, remap, remap_as, remove_points, remove_scans};

@@ -180,6 +180,14 @@ pub fn map_id_of(py: Python<'_>, argument: &str, digits: &str) -> PyResult<[u8; 
     id.map(u128::to_be_bytes).ok_or_else(|| wrong(py, argument, reason()))
 }
 
+/// Digest of the scans that a map keeps, in their order, as `voxtile digest --scans` prints it. The same scans have the
+/// same digest, whatever map keeps them.
+#[pyfunction]
+pub fn scan_digest(py: Python<'_>, map: MapOrSnapshot) -> PyResult<String> {
+    let digest = py.detach(|| map.open().and_then(|map| voxtile_pipeline::scan_digest(&map)));
+    digest.map(|digest| digest.to_string()).map_err(|error| exception(py, &error))
+}
+
 /// Joins shards with the same id and disjoint tiles into one map, without reading their tiles.
 #[pyfunction]
 #[pyo3(signature = (shards, output, *, progress=None))]
@@ -260,9 +268,11 @@ struct Described {
 
 /// Makes a map of the part of another that is inside a box, or outside it. `polygon` replaces the box: a GeoJSON file of
 /// polygons in the map's coordinates, with heights `z`, the lowest and the highest, in metres (default: all). With
-/// `shard_of` it makes a shard of the map with this id; the shard is not durable until `move_shard` has moved it.
+/// `keep_scans` the new map keeps the kept scans that reach the part (see `voxtile crop --keep-scans`). With `shard_of`
+/// it makes a shard of the map with this id; the shard is not durable until `move_shard` has moved it.
 #[pyfunction]
-#[pyo3(signature = (map, output, region=None, *, polygon=None, z=None, outside=false, shard_of=None, progress=None))]
+#[pyo3(signature = (map, output, region=None, *, polygon=None, z=None, outside=false, keep_scans=false, shard_of=None,
+    progress=None))]
 #[expect(clippy::too_many_arguments, reason = "keywords, in Python")]
 pub fn crop<'py>(
     py: Python<'py>,
@@ -272,9 +282,11 @@ pub fn crop<'py>(
     polygon: Option<PathBuf>,
     z: Option<[f64; 2]>,
     outside: bool,
+    keep_scans: bool,
     shard_of: Option<&str>,
     progress: Callback,
 ) -> PyResult<Bound<'py, PyAny>> {
+    let scans = if keep_scans { CopyScans::Yes } else { CopyScans::No };
     let region = match (region, polygon) {
         (Some(region), None) if z.is_none() => region,
         (None, Some(_)) if shard_of.is_some() => {
@@ -285,7 +297,7 @@ pub fn crop<'py>(
             return reported(py, progress, |_, progress| {
                 let (file, map) = (PolygonFile::read(&polygon)?, map.open()?);
                 let part = AreaPart { area: file.area_in(&map)?, z_m, is_outside: outside };
-                operations::crop_area(&map, &part, &output, |done, all| progress.report(done, all))
+                operations::crop_area(&map, &part, scans, &output, |done, all| progress.report(done, all))
             });
         }
         (Some(_), None) => return Err(wrong(py, "z", "belongs to `polygon`; a region has its own heights")),
@@ -296,7 +308,7 @@ pub fn crop<'py>(
     reported(py, progress, |_, progress| {
         let report = |done, all| progress.report(done, all);
         match shard_of {
-            None => operations::crop(&map.open()?, &part, &output, report),
+            None => operations::crop(&map.open()?, &part, scans, &output, report),
             Some(map_id) => operations::crop_shard(&map.open()?, &part, &output, map_id, report),
         }
     })

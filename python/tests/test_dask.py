@@ -71,6 +71,32 @@ def test_any_regions_make_the_map_of_one_build(
     assert len(files) > 20 and all(file.stat().st_nlink == 1 for file in files)
 
 
+@pytest.mark.parametrize("region_size", [4.0, 5.3, 100.0])
+def test_kept_scans_are_those_of_one_build(client: object, region_size: float, drive: Path, tmp_path: Path) -> None:
+    # A scan that changes no voxel is kept, too.
+    content = (drive / "004.pcd").read_bytes()
+    at = content.index(b"binary\n") + len(b"binary\n")
+    far = np.frombuffer(content[at:], np.float32) * np.float32(np.inf)
+    (drive / "004.pcd").write_bytes(content[:at] + far.tobytes())
+    voxtile.build(drive, tmp_path / "whole", keep_scans=True, **OPTIONS)
+    options = {**OPTIONS, "keep_scans": True, "client": client, "region_size": region_size}
+    voxtile_dask.build(drive, tmp_path / "map", **options)
+    assert voxtile.verify(tmp_path / "map")["findings"] == []
+    for digest in voxtile.digest, voxtile.scan_digest:
+        assert digest(tmp_path / "map") == digest(tmp_path / "whole")
+    poses = np.loadtxt(drive / "poses_kitti.txt")
+    poses[5:, 3] += 0.4
+    np.savetxt(tmp_path / "moved.txt", poses, fmt="%.17g")
+    # One process changes the map, a cluster makes another one.
+    voxtile_dask.build(tmp_path / "map", tmp_path / "moved", poses=tmp_path / "moved.txt", **options)
+    rows = poses.reshape(-1, 3, 4)
+    matrices = np.concatenate([rows, np.broadcast_to([[[0, 0, 0, 1.0]]], (len(rows), 1, 4))], axis=1)
+    for path in "map", "whole":
+        voxtile.remap(tmp_path / path, matrices)
+    for digest in voxtile.digest, voxtile.scan_digest:
+        assert digest(tmp_path / "map") == digest(tmp_path / "whole") == digest(tmp_path / "moved")
+
+
 def test_the_tile_size_follows_the_resolution(client: object, drive: Path, tmp_path: Path) -> None:
     options = {"resolution": 0.15, "max_range": 4.0}
     voxtile.build(drive, tmp_path / "whole", **options)

@@ -360,6 +360,9 @@ pub struct DigestArgs {
     /// Print the digest of the layers instead of that of the evidence
     #[arg(long)]
     pub layers: bool,
+    /// Print the digest of the kept scans instead, in their order
+    #[arg(long, conflicts_with = "layers")]
+    pub scans: bool,
     #[arg(long, help = help::JSON)]
     pub json: bool,
 }

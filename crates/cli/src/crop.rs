@@ -9,7 +9,7 @@ use crate::written::{print_written, warn_of_scans_left};
 use serde::Serialize;
 use std::path::Path;
 use std::process::ExitCode;
-use voxtile::operations::{AreaPart, Part, WrittenMap, crop, crop_area};
+use voxtile::operations::{AreaPart, CopyScans, Part, WrittenMap, crop, crop_area};
 use voxtile_pipeline::{PolygonFile, memory};
 
 #[derive(Serialize)]
@@ -45,16 +45,21 @@ impl Selected {
 pub fn run(args: &CropArgs) -> anyhow::Result<ExitCode> {
     let progress = Progress::over_tiles(0);
     let (part, output) = (Selected::of(args)?, whole_map(&args.output)?);
+    let scans = if args.keep_scans { CopyScans::Yes } else { CopyScans::No };
     let (written, warnings) = read_map(&args.map, |map| {
+        if args.keep_scans {
+            map.kept_scans()?;
+        }
         let report = |done, all| progress.set(done, all);
         let written = match &part {
-            Selected::Box(part) => crop(map, part, output, report)?,
+            Selected::Box(part) => crop(map, part, scans, output, report)?,
             Selected::Polygon(file, z_m) => {
                 let (area, z_m) = (file.area_in(map)?, *z_m);
-                crop_area(map, &AreaPart { area, z_m, is_outside: args.outside }, output, report)?
+                crop_area(map, &AreaPart { area, z_m, is_outside: args.outside }, scans, output, report)?
             }
         };
-        Ok((written, warn_of_scans_left([map])))
+        let warnings = if args.keep_scans { Vec::new() } else { warn_of_scans_left([map]) };
+        Ok((written, warnings))
     })?;
     drop(progress);
     let mut out = summary_out(args.json);

@@ -5,13 +5,16 @@ use std::process::ExitCode;
 use voxtile::MapQueries;
 use voxtile::mapper::MapView;
 use voxtile_pipeline::memory;
-use voxtile_pipeline::read_any_map;
+use voxtile_pipeline::{read_any_map, read_map, scan_digest};
 
 pub fn run(args: &DigestArgs) -> anyhow::Result<ExitCode> {
-    let (digest, scan_number) = read_any_map(&args.map, |reader| {
-        let digest = if args.layers { reader.layer_digest()? } else { reader.digest()? };
-        Ok((digest, reader.scan_number()))
-    })?;
+    let (digest, scan_number) = match args.scans {
+        true => read_map(&args.map, |map| Ok((scan_digest(map)?, map.scan_number())))?,
+        false => read_any_map(&args.map, |map| {
+            let digest = if args.layers { map.layer_digest()? } else { map.digest()? };
+            Ok((digest, map.scan_number()))
+        })?,
+    };
     let mut out = std::io::stdout().lock();
     if args.json {
         let digest = digest.to_string();

@@ -10,6 +10,7 @@
 //! write_distances_npz, write_distances_png                          distance_files
 //! Comparison of two maps -> lists, files of voxels, warnings        changes/
 //! read_moving_points: marked points of kept scans                    moving_points
+//! scan_digest: a digest of kept scans                                scan_digest
 //! numbers: lists of numbers used by all front ends                  numbers
 //! PolygonFile: an area of GeoJSON                                   polygon_file
 //! Watch: stops work and receives its progress                       watch
@@ -41,6 +42,7 @@ pub mod place;
 mod polygon_file;
 mod pose_check;
 mod region_tiles;
+mod scan_digest;
 mod scan_input;
 mod scan_place;
 mod scan_queue;
@@ -70,6 +72,7 @@ pub use map_at::{
 pub use moving_points::read_moving_points;
 pub use new_poses::{PoseFile, poses_for};
 pub use polygon_file::PolygonFile;
+pub use scan_digest::scan_digest;
 pub use scan_input::{ScanInput, ScanInputs, is_standard_input, open_paths};
 pub use scan_place::LocalScans;
 pub use scan_queue::WhenBehind;

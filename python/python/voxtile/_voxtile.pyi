@@ -45,6 +45,7 @@ __all__ = [
     "remap_as",
     "remove_points",
     "remove_scans",
+    "scan_digest",
     "repair",
     "revert",
     "run_command",
@@ -444,6 +445,7 @@ def merge(
 def move_shard(
     map: _Path, output: _Path, map_id: str, *, progress: _Progress | None = None
 ) -> dict[str, Any]: ...
+def scan_digest(map: _MapOrSnapshot) -> str: ...
 def join(shards: Sequence[_Path], output: _Path, *, progress: _Progress | None = None) -> dict[str, Any]: ...
 def replace_tiles(
     map: _Path, parts: Sequence[_Path], *, of_flush: int, scans: int, progress: _Progress | None = None
@@ -458,6 +460,7 @@ def crop(
     polygon: _Path | None = None,
     z: tuple[float, float] | None = None,
     outside: bool = False,
+    keep_scans: bool = False,
     shard_of: str | None = None,
     progress: _Progress | None = None,
 ) -> dict[str, Any]: ...

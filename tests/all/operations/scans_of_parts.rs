@@ -157,10 +157,9 @@ fn shards_that_are_visited_twice_are_opened_again() {
     assert_eq!(records(&disk, "joined"), records(&disk, "whole"));
 }
 
-fn merged(disk: &FaultyDisk, names: &[&str], prefer: Option<Prefer>) -> Merged {
-    disk.files().keys().filter(|file| file.starts_with(path("merged"))).for_each(|file| disk.take(file));
+fn merged(disk: &FaultyDisk, output: &str, names: &[&str], prefer: Option<Prefer>) -> Merged {
     let maps: Vec<MapReader> = names.iter().map(|name| open(disk, &path(name)).unwrap()).collect();
-    merge(&maps, path("merged"), prefer, |_, _| {}).unwrap()
+    merge(&maps, path(output), prefer, |_, _| {}).unwrap()
 }
 
 #[test]
@@ -174,7 +173,7 @@ fn merged_maps_keep_the_scans_of_both_if_their_evidence_is_added() {
         scans.iter().for_each(|scan| scan.insert_into(&mut mapper).unwrap());
         mapper.flush().unwrap();
     }
-    assert!(merged(&disk, &["a", "b"], None).keeps_scans);
+    assert!(merged(&disk, "merged", &["a", "b"], None).keeps_scans);
     assert!(is_whole(&disk, "merged"));
     assert_eq!(records(&disk, "merged"), records(&disk, "whole"));
     let content = content(&config, &scans);
@@ -184,9 +183,9 @@ fn merged_maps_keep_the_scans_of_both_if_their_evidence_is_added() {
     let [of_merged, of_whole] = ["merged", "whole"].map(|name| open(&disk, &path(name)).unwrap());
     assert!(testkit::reference_map::voxels_of(&of_merged) == testkit::reference_map::voxels_of(&of_whole));
     // With a preference, a part of the evidence of the scans is not in the map.
-    assert!(!merged(&disk, &["a", "b"], Some(Prefer::First)).keeps_scans);
+    assert!(!merged(&disk, "first", &["a", "b"], Some(Prefer::First)).keeps_scans);
     // Both have the scans of `a`.
-    assert!(!merged(&disk, &["a", "a"], None).keeps_scans);
+    assert!(!merged(&disk, "twice", &["a", "a"], None).keeps_scans);
 }
 
 #[test]

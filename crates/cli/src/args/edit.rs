@@ -59,6 +59,10 @@ pub struct CropArgs {
     /// Select all other voxels instead
     #[arg(long)]
     pub outside: bool,
+    /// Keep the kept scans that reach the part too, with all their points. A remap maps them into whole tiles, so it
+    /// restores the voxels of the outer tiles
+    #[arg(long, conflicts_with = "outside")]
+    pub keep_scans: bool,
     #[arg(short = 'o', long = "output", value_name = "MAP", help = help::NEW_MAP)]
     pub output: PathBuf,
     #[arg(long, help = help::JSON)]

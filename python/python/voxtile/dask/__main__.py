@@ -49,6 +49,7 @@ def _arguments() -> argparse.ArgumentParser:
     parser.add_argument("--storage", choices=["octomap", "compact"])
     parser.add_argument("--format", help="format of the scans, if their content does not identify it")
     parser.add_argument("--poses", metavar="FILE", help="file with the poses of the scans")
+    parser.add_argument("--keep-scans", action="store_true", help="keep the scans, so that the map can be remapped")
     parser.add_argument("--json", action="store_true", help="print the report as JSON")
     return parser
 
@@ -81,7 +82,7 @@ def main() -> int:
     arguments = vars(_arguments().parse_args())
     scans, output, as_json = (arguments.pop(name) for name in ("scans", "output", "json"))
     scheduler, workers = arguments.pop("scheduler"), arguments.pop("local")
-    options = {name: value for name, value in arguments.items() if value is not None}
+    options = {name: value for name, value in arguments.items() if value is not None and value is not False}
     if workers is not None and workers < 1:
         print("error: --local: must be at least 1", file=sys.stderr)
         return 2

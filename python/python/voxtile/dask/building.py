@@ -28,7 +28,7 @@ from ..errors import ArgumentError, VoxtileError
 from ..files import ReadOptions
 from . import losses
 from .shards import MAP_ID, move_to_place, locked, remove
-from .regions import Box, Column, Range, columns_of, region_of, scans_in, tiles_of
+from .regions import Box, Column, Range, columns_of, region_of, scans_in, tiles_of, with_unreached
 from .simulation import advised_region_size
 
 try:
@@ -71,6 +71,7 @@ class BuildOptions(ReadOptions, total=False):
     insert_mode: Literal["per-scan", "per-ray"]
     clearing: Literal["octomap", "guarded"]
     layers: str
+    keep_scans: bool
     clear_no_return: float | None
 
 
@@ -89,7 +90,8 @@ def build(
 
     The map has the digest of ``voxtile.build``, for any ``region_size`` (metres, along x and y) and any number of
     workers. All workers and this process must see ``scans`` and the folder of ``out``. Finished regions are kept in
-    ``out + ".parts"`` until the end; after a failure, the same call resumes from them.
+    ``out + ".parts"`` until the end; after a failure, the same call resumes from them. With ``keep_scans`` the map
+    keeps each scan once, with the number and content that ``voxtile.build`` gives it.
 
     With ``update`` the scans are added to the map ``out``, as ``voxtile.build`` does with ``append`` and ``again``
     and the same keywords. Pass ``max_range`` and similar options again: they are not taken from the map. Only the
@@ -124,6 +126,8 @@ def build(
         columns = columns_of(boxes, size, tile_size, most=_MAX_REGIONS)
         if not columns:
             raise ArgumentError(f"{source}: no scan has a point; check the input")
+        if settings.get("keep_scans"):
+            columns = with_unreached(columns, boxes)
         drive = _fingerprint(source, size, settings, seen, str(output) if base else None)
         if base is not None and (adopted := _committed_before(parts, drive, base)) is not None:
             remove(parts)
@@ -310,6 +314,8 @@ def _check(output: Path, region_size: float, tile_size: float, options: Any, upd
     # A column narrower than two tiles may contain no tile center.
     if not (math.isfinite(region_size) and region_size >= 2 * tile_size):
         raise ArgumentError(f"region_size: {region_size} m is less than two tiles of {tile_size} m; use a larger size")
+    if update and options.get("keep_scans"):
+        raise ArgumentError("keep_scans: an update cannot begin to keep scans; build the map with it")
     if not update and "resolution" not in options:
         raise ArgumentError("resolution: a new map needs it; pass the edge of a voxel in metres")
     if not update and output.exists():

@@ -50,6 +50,22 @@ def columns_of(
     return columns
 
 
+def with_unreached(columns: dict[Column, list[Range]], boxes: Sequence[Box | None]) -> dict[Column, list[Range]]:
+    """Returns the columns with all scans that reach none of them as scans of the first one, which keeps them."""
+    if not columns:
+        return columns
+    first = min(columns)
+    own = [number for low, end in columns[first] for number in range(low, end)]
+    unreached = [number for number, box in enumerate(boxes) if box is None]
+    ranges: list[Range] = []
+    for number in sorted({*own, *unreached}):
+        if ranges and ranges[-1][1] == number:
+            ranges[-1] = (ranges[-1][0], number + 1)
+        else:
+            ranges.append((number, number + 1))
+    return {**columns, first: ranges}
+
+
 def reached(box: Box, size: float, tile_size: float) -> Iterator[Column]:
     """Yields the columns that may contain the center of a tile that the box touches."""
     west, south, east, north = box
