@@ -1,7 +1,7 @@
 use crate::components::Sums;
 use crate::voxel_class::VoxelClass;
 use rustc_hash::FxHashMap;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use voxtile::{Aabb, Grid, Point, VoxelIndex};
 
 /// Result of [`compare`](crate::compare()).
@@ -47,7 +47,7 @@ impl Comparison {
 }
 
 /// Counts of the occupied voxels of a map that is compared with another one.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[non_exhaustive]
 pub struct EpochCounts {
     /// All occupied voxels.

@@ -1,21 +1,23 @@
 use crate::bits::Bits;
 use crate::block_bits::BlockBits;
 use crate::blocks::{BlockIndex, Cube, blocks_of, may_be_occupied};
-use crate::change::{Change, ChangeKind, Clusters, Comparison, EpochCounts};
+use crate::change::{Comparison, EpochCounts};
 use crate::classify::{ClassBits, NOT_SEEN, reach};
-use crate::components::{Components, order};
+use crate::collected::Collected;
+use crate::components::Components;
 use crate::hidden::hidden;
-use crate::joined::{BlockParts, Joined};
+use crate::joined::BlockParts;
 use crate::mask_reader::{MaskReader, TilesOfBatch};
 use crate::options::CompareOptions;
 use crate::sweep::Sweep;
 use crate::tile_masks::Thresholds;
 use crate::voxel_class::VoxelClass;
-use rustc_hash::{FxHashMap, FxHashSet};
-use std::cmp::Reverse;
+use rustc_hash::FxHashSet;
+use serde::{Deserialize, Serialize};
+use std::ops::Range;
 use voxtile::mapper::MapView;
 use voxtile::space::VoxelBox;
-use voxtile::{Error, Result, TileIndex};
+use voxtile::{Error, Grid, Result, TileIndex};
 
 /// Compares two maps: finds which occupied voxels of each are unchanged, changed or not seen in the other one, and lists
 /// the clusters of changed voxels.
@@ -57,65 +59,41 @@ pub fn compare<A: MapView, B: MapView>(
     progress: &(dyn Fn(u64, u64) + Sync),
 ) -> Result<Comparison> {
     let comparer = Comparer::new(before, after, options)?;
-    let mut counts = comparer.counts();
-    let mut joined = KINDS.map(|_| Joined::new(options.min_voxels.max(1)));
+    let mut collected = Collected::new(&comparer);
     comparer.for_each_block(
         &VoxelClass::ALL,
         progress,
         |block, classes| comparer.block_result(block, classes),
         |block, result| {
-            for (all, of_block) in counts.iter_mut().zip(result.counts) {
-                *all += of_block;
-            }
-            for (joined, parts) in joined.iter_mut().zip(result.parts) {
-                parts.join(block, joined);
-            }
+            collected.take(block, result);
             Ok(())
         },
     )?;
-    let [vanished, appeared] = joined.map(Joined::finish);
-    let clusters = [&vanished, &appeared]
-        .map(|(listed, small)| Clusters::new(listed.iter().map(|cluster| &cluster.sums), *small));
-    let mut all: Vec<_> = vanished.0.into_iter().map(|cluster| (ChangeKind::Vanished, cluster)).collect();
-    all.extend(appeared.0.into_iter().map(|cluster| (ChangeKind::Appeared, cluster)));
-    all.sort_unstable_by_key(|(_, cluster)| (Reverse(cluster.sums.voxels), order(cluster.sums.lowest)));
-    let mut change_of_part = FxHashMap::default();
-    let mut changes = Vec::with_capacity(all.len());
-    for ((kind, cluster), number) in all.into_iter().zip(1..) {
-        change_of_part.extend(cluster.parts.into_iter().map(|lowest| (lowest, number)));
-        changes.push(Change::of(number, kind, &cluster.sums, &before.config().grid));
-    }
-    Ok(Comparison {
-        tolerance_voxels: comparer.tolerance_voxels,
-        min_voxels: options.min_voxels.max(1),
-        certain_log_odds: comparer.certain_log_odds,
-        before: counts[0],
-        after: counts[1],
-        vanished: clusters[0],
-        appeared: clusters[1],
-        changes,
-        change_of_part,
-    })
+    Ok(collected.finish())
 }
 
 /// The classes of clustered voxels: vanished, then appeared.
-const KINDS: [VoxelClass; 2] = [VoxelClass::Vanished, VoxelClass::Appeared];
+pub(crate) const KINDS: [VoxelClass; 2] = [VoxelClass::Vanished, VoxelClass::Appeared];
 
 /// Two maps, with checked options.
 pub(crate) struct Comparer<'a, A, B> {
     before: &'a A,
     after: &'a B,
-    options: &'a CompareOptions,
-    tolerance_voxels: u32,
-    certain_log_odds: f64,
+    pub(crate) options: &'a CompareOptions,
+    pub(crate) tolerance_voxels: u32,
+    pub(crate) certain_log_odds: f64,
     /// Voxels of the region.
     region: Option<VoxelBox>,
+    /// The blocks to compare, of all; `None` for all.
+    span: Option<Range<u64>>,
 }
 
-struct BlockResult {
-    counts: [EpochCounts; 2],
+/// Result of a block.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub(crate) struct BlockResult {
+    pub(crate) counts: [EpochCounts; 2],
     /// By [`KINDS`].
-    parts: [BlockParts; 2],
+    pub(crate) parts: [BlockParts; 2],
 }
 
 /// Masks of the tiles of both maps.
@@ -140,11 +118,21 @@ impl<'a, A: MapView, B: MapView> Comparer<'a, A, B> {
             tolerance_voxels: options.tolerance_voxels(&grid)?,
             certain_log_odds: options.certain_log_odds()?,
             region: options.region.map(|region| grid.voxels_in(&region)),
+            span: None,
         })
     }
 
+    /// Limits the comparison to some of its blocks.
+    pub(crate) fn with_span(self, span: Range<u64>) -> Self {
+        Self { span: Some(span), ..self }
+    }
+
+    pub(crate) fn grid(&self) -> &Grid {
+        &self.before.config().grid
+    }
+
     /// Counts of no voxels.
-    fn counts(&self) -> [EpochCounts; 2] {
+    pub(crate) fn counts(&self) -> [EpochCounts; 2] {
         let [earlier, later] = self.is_hidden_known().map(|is_known| is_known.then_some(0));
         [later, earlier].map(|hidden| EpochCounts { hidden, ..EpochCounts::default() })
     }
@@ -184,7 +172,8 @@ impl<'a, A: MapView, B: MapView> Comparer<'a, A, B> {
         )
     }
 
-    fn blocks(&self) -> Vec<BlockIndex> {
+    /// The blocks with occupied voxels of the span, in order.
+    pub(crate) fn blocks(&self) -> Vec<BlockIndex> {
         let grid = &self.before.config().grid;
         let mut blocks = blocks_of(grid, occupied_tiles(self.before));
         blocks.extend(blocks_of(&self.after.config().grid, occupied_tiles(self.after)));
@@ -195,6 +184,10 @@ impl<'a, A: MapView, B: MapView> Comparer<'a, A, B> {
                 let [min, end] = Cube::of_block(block).positions_of(&region);
                 (0..3).all(|k| min[k] < end[k])
             });
+        }
+        if let Some(span) = &self.span {
+            let [first, end] = [span.start, span.end].map(|k| (k as usize).min(blocks.len()));
+            blocks = blocks.drain(first..end.max(first)).collect();
         }
         blocks
     }
@@ -240,7 +233,7 @@ impl<'a, A: MapView, B: MapView> Comparer<'a, A, B> {
         Ok(classes)
     }
 
-    fn block_result(&self, block: BlockIndex, classes: &ClassBits) -> Result<BlockResult> {
+    pub(crate) fn block_result(&self, block: BlockIndex, classes: &ClassBits) -> Result<BlockResult> {
         let mut components = KINDS.map(|class| Components::of(classes.of_class(class)));
         let [vanished, appeared] = &mut components;
         if !self.before.config().layers().is_none() {

@@ -2,6 +2,7 @@ use crate::bits::{Bits, Run};
 use crate::blocks::Cube;
 use crate::sets::Sets;
 use rustc_hash::FxHashMap;
+use serde::{Deserialize, Serialize};
 use std::collections::hash_map::Entry;
 use voxtile::mapper::MapView;
 use voxtile::{Result, VoxelIndex, VoxelLayers};
@@ -18,7 +19,7 @@ pub(crate) struct Components {
 }
 
 /// Sums over connected voxels.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Sums {
     pub(crate) voxels: u64,
     /// First voxel by z, then y, then x.

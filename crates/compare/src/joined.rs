@@ -2,6 +2,7 @@ use crate::blocks::{BLOCK_EDGE, BlockIndex, Cube};
 use crate::components::{Components, Sums, order};
 use crate::sets::Sets;
 use rustc_hash::FxHashMap;
+use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use voxtile::VoxelIndex;
 
@@ -138,6 +139,7 @@ impl Joined {
 }
 
 /// Parts of a block and their voxels at its border.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct BlockParts {
     pub(crate) parts: Vec<Sums>,
     pub(crate) border: Vec<(VoxelIndex, u32)>,

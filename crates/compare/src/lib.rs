@@ -10,7 +10,8 @@
 //! viewpoints -> hidden                            of those not seen, the ones that something was in front of
 //!     -> components                               connected voxels of a class within a block
 //!     -> joined                                   the same across blocks
-//! compare -> Comparison                           counts, and the list of changes
+//! compare -> collected -> Comparison              counts, and the list of changes
+//! compare_span -> join_spans -> Comparison        the same by several processes, each for a span of blocks
 //! for_each_voxel                                  the voxels with their classes, in a second pass
 //! frontiers -> frontier_search                    free voxels next to unknown ones, of one map
 //!     -> components -> joined                     the same, clustered
@@ -27,6 +28,7 @@ mod block_bits;
 mod blocks;
 mod change;
 mod classify;
+mod collected;
 mod compare;
 mod components;
 mod frontier_goals;
@@ -39,6 +41,7 @@ mod nearest_position;
 mod observations;
 mod options;
 mod sets;
+mod span;
 mod sweep;
 mod tile_masks;
 mod tops;
@@ -53,6 +56,7 @@ pub use compare::compare;
 pub use frontiers::{Coverage, Frontier, FrontierOptions, frontiers, frontiers_in};
 pub use observations::{Class, Observations, observations};
 pub use options::{CompareOptions, MAX_TOLERANCE_VOXELS};
+pub use span::{ComparedSpan, compare_span, count_blocks, join_spans};
 pub use viewpoints::Viewpoints;
 pub use visit::{ComparedVoxel, for_each_voxel};
 pub use volume_options::VolumeOptions;

@@ -1,10 +1,11 @@
 use crate::config::Layers;
 use crate::scan::OFFSETS_PER_VOXEL;
+use serde::{Deserialize, Serialize};
 
 /// What a map's layers store of the points that hit a voxel. Sums of layers that the map does not have are zero.
 ///
 /// None of the sums can overflow: an observation count has 31 bits, and squares of intensities and offsets at most 32.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[non_exhaustive]
 pub struct VoxelLayers {
     /// Number of points that hit the voxel.
@@ -22,7 +23,7 @@ pub struct VoxelLayers {
 }
 
 /// Sums of the colours of the points in a voxel, 0 to 255 each.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct ColourSums {
     /// Number of points with a colour.
     pub points: u64,
@@ -35,7 +36,7 @@ pub struct ColourSums {
 }
 
 /// Sums of the stored intensities of the points in a voxel, 0 to 65535 each ([`Layers::intensity_max`]).
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct IntensitySums {
     /// Number of points with an intensity.
     pub points: u64,
@@ -46,7 +47,7 @@ pub struct IntensitySums {
 }
 
 /// Number of points with a class.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct ClassVotes {
     /// Class.
     pub class: u8,
@@ -55,7 +56,7 @@ pub struct ClassVotes {
 }
 
 /// Time stamps of the first and last scan that hit a voxel, in nanoseconds since the epoch of their source.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct TimeSpan {
     /// The first.
     pub first_ns: i64,
@@ -64,7 +65,7 @@ pub struct TimeSpan {
 }
 
 /// Sums of the offsets of the points in a voxel from its center, in units of 1/1024 of its edge, and of their products.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct ShapeSums {
     /// Sums of the offsets along x, y and z.
     pub offsets: [i64; 3],

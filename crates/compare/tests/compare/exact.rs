@@ -1,12 +1,14 @@
 use crate::naive::{Positions, bounds_m, classes, clusters, is_hidden, is_same_box, thinned, voxels_of};
 use crate::random_maps::{TILE_SIZES_M, config, fill, random_map, random_region, storage_of};
+use serde_json::json;
 use std::collections::{BTreeMap, BTreeSet};
 use testkit::random_scans::Random;
 use testkit::support::cases;
 use voxtile::mapper::MapView;
 use voxtile::{MapOptions, MapReader, Mapper, VoxelIndex};
 use voxtile_compare::{
-    ChangeKind, CompareOptions, Comparison, EpochCounts, Viewpoints, VoxelClass, compare, for_each_voxel,
+    ChangeKind, CompareOptions, Comparison, EpochCounts, Viewpoints, VoxelClass, compare, compare_span,
+    count_blocks, for_each_voxel, join_spans,
 };
 
 type Classes = BTreeMap<VoxelIndex, VoxelClass>;
@@ -17,6 +19,9 @@ fn compared<A: MapView, B: MapView>(
     options: &CompareOptions,
 ) -> (Comparison, Classes, BTreeMap<VoxelIndex, u32>) {
     let comparison = compare(a, b, options, &|_, _| {}).unwrap();
+    let of_spans = compared_in_spans(a, b, options);
+    assert_eq!(json!(of_spans), json!(comparison));
+    let comparison = of_spans;
     let (mut classes, mut changes) = (Classes::new(), BTreeMap::new());
     for_each_voxel(
         a,
@@ -33,6 +38,20 @@ fn compared<A: MapView, B: MapView>(
     )
     .unwrap();
     (comparison, classes, changes)
+}
+
+/// Compares spans of one to three blocks alone, as if other processes did.
+fn compared_in_spans<A: MapView, B: MapView>(a: &A, b: &B, options: &CompareOptions) -> Comparison {
+    let blocks = count_blocks(a, b, options).unwrap();
+    let (mut spans, mut first) = (Vec::new(), 0);
+    while first < blocks {
+        let end = first + 1 + first % 3;
+        let span = compare_span(a, b, options, first..end, &|_, _| {}).unwrap();
+        spans.push(serde_json::to_vec(&span).unwrap());
+        first = end;
+    }
+    let spans = spans.iter().map(|bytes| serde_json::from_slice(bytes).unwrap());
+    join_spans(a, b, options, spans).unwrap()
 }
 
 fn counts(classes: &Classes, names: [VoxelClass; 3]) -> [u64; 5] {

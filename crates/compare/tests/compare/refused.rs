@@ -1,8 +1,11 @@
 use crate::random_maps::random_map;
+use std::ops::Range;
 use testkit::support::message_of;
 use voxtile::scan::{PointBatch, Stop};
 use voxtile::{Aabb, Error, InMemoryMapper, MapConfig, Mapper};
-use voxtile_compare::{CompareOptions, FrontierOptions, Viewpoints, compare, frontiers};
+use voxtile_compare::{
+    CompareOptions, FrontierOptions, Viewpoints, compare, compare_span, count_blocks, frontiers, join_spans,
+};
 
 #[test]
 fn invalid_arguments_are_refused() {
@@ -23,6 +26,23 @@ fn invalid_arguments_are_refused() {
     let coarse = InMemoryMapper::new(MapConfig::new(0.2, 10.0).unwrap()).unwrap();
     let message = message_of(compare(&map, &coarse, &CompareOptions::default(), &|_, _| {}));
     assert!(message.contains("0.1 m and 0.2 m"), "{message}");
+}
+
+#[test]
+fn spans_of_other_blocks_are_refused() {
+    let map = random_map(1, 1, 3.0);
+    let options = CompareOptions::default();
+    let blocks = count_blocks(&map, &map, &options).unwrap();
+    assert!(blocks > 2, "{blocks}");
+    let span = |range: Range<u64>| compare_span(&map, &map, &options, range, &|_, _| {}).unwrap();
+    let all = [span(0..2), span(2..blocks + 7)];
+    assert!(join_spans(&map, &map, &options, all.clone()).is_ok());
+    for spans in
+        [vec![span(0..2)], vec![all[1].clone(), all[0].clone()], [&all[..], &all[1..]].concat(), vec![]]
+    {
+        let message = message_of(join_spans(&map, &map, &options, spans));
+        assert!(message.contains("spans"), "{message}");
+    }
 }
 
 #[test]
