@@ -3,19 +3,25 @@
 use crate::arrays::{Points, column, object, rows};
 use crate::config::bytes_of;
 use crate::errors::{exception_of_kind, wrong};
+use crate::keywords::Keywords;
 use crate::map::{Map, region_of};
 use crate::operations::{Callback, MapOrSnapshot};
-use crate::source::{Source, State};
-use crate::watched::{Progress, watched, watched_with_progress};
+use crate::options::region;
+use crate::source::{Source, State, View};
+use crate::watched::{watched, watched_with_progress};
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
-use pyo3::types::PyDict;
+use pyo3::pybacked::PyBackedBytes;
+use pyo3::types::{PyBytes, PyDict};
 use std::path::PathBuf;
 use std::sync::Arc;
 use voxtile::mapper::MapView;
 use voxtile::store::Extension;
-use voxtile::{Aabb, Grid, Point, Result, Stop};
-use voxtile_compare::{CompareOptions, Viewpoints, VoxelClass, for_each_voxel};
+use voxtile::{Aabb, Error, Grid, MapConfig, Point, Result, Stop, TileBox};
+use voxtile_compare::{
+    CompareOptions, ComparedSpan, Viewpoints, VoxelClass, compare_span, count_blocks, for_each_voxel,
+    join_spans,
+};
 use voxtile_pipeline::{ComparedMap, change_features, check_crs, class_code, warnings_of};
 
 /// Memory for tiles.
@@ -101,18 +107,122 @@ pub fn compare(
         .with_region(region.as_ref().map(region_of).transpose()?)
         .with_memory(memory.as_ref().map(bytes_of).transpose()?.unwrap_or(DEFAULT_BYTES));
     let places = [Place::of(py, before)?, Place::of(py, after)?];
-    let points_of = |points: &Bound<'_, PyAny>| Ok(Points::of("positions", points)?.slice()?.to_vec());
-    let (of_before, of_after) = positions.unwrap_or_default();
-    let positions: [Option<PyResult<Vec<Point>>>; 2] =
-        [of_before, of_after].map(|points| points.as_ref().map(points_of));
-    let [of_before, of_after] = positions.map(Option::transpose);
-    let positions = [of_before?, of_after?];
+    let asked = Asked { places, options, positions: positions_of(positions)? };
     watched_with_progress(py, progress, |stop, progress| {
-        let sides = [places[0].open()?, places[1].open()?];
-        let viewpoints = [viewpoints(&sides[0], &positions[0])?, viewpoints(&sides[1], &positions[1])?];
-        let options = options.with_viewpoints(viewpoints).with_stop(stop.clone());
-        Comparison::of(sides, options, progress)
+        let report = |done, all| progress.report(done, all);
+        asked
+            .open(stop)?
+            .compared(|before, after, options| voxtile_compare::compare(before, after, options, &report))
     })
+}
+
+/// Compares one of several parts of two maps, for `join_parts`: `part` counts from 0. `options` are keywords of
+/// `compare`, without `progress`.
+#[pyfunction]
+pub fn compare_part<'py>(
+    py: Python<'py>,
+    before: MapOrSnapshot,
+    after: MapOrSnapshot,
+    part: u64,
+    parts: u64,
+    options: &Bound<'py, PyDict>,
+) -> PyResult<Bound<'py, PyBytes>> {
+    let asked = Asked::of(py, [before, after], options)?;
+    let bytes = watched(py, |stop| {
+        let opened = asked.open(stop)?;
+        let maps = [&*opened.sides[0].source, &*opened.sides[1].source];
+        let span = Source::ask_both(maps, stop, |[before, after], _| {
+            check_crs(opened.compared_maps([before.config(), after.config()], [None; 2]))?;
+            let all = u128::from(count_blocks(before, after, &opened.options)?);
+            let border = |part: u64| (all * u128::from(part) / u128::from(parts.max(1))) as u64;
+            compare_span(
+                before,
+                after,
+                &opened.options,
+                border(part)..border(part.saturating_add(1)),
+                &|_, _| {},
+            )
+        })?;
+        serde_json::to_vec(&span).map_err(|error| Error::argument("part", error.to_string()))
+    })?;
+    Ok(PyBytes::new(py, &bytes))
+}
+
+/// Joins the results of all parts of a comparison, in their order.
+#[pyfunction]
+pub fn join_parts<'py>(
+    py: Python<'py>,
+    before: MapOrSnapshot,
+    after: MapOrSnapshot,
+    parts: Vec<PyBackedBytes>,
+    options: &Bound<'py, PyDict>,
+) -> PyResult<Comparison> {
+    let asked = Asked::of(py, [before, after], options)?;
+    watched(py, |stop| {
+        let span = |bytes: &PyBackedBytes| {
+            serde_json::from_slice(bytes).map_err(|error| Error::argument("parts", error.to_string()))
+        };
+        asked.open(stop)?.compared(|before, after, options| {
+            let spans: Vec<ComparedSpan> = parts.iter().map(span).collect::<Result<_>>()?;
+            join_spans(before, after, options, spans)
+        })
+    })
+}
+
+/// Converts the positions of the sensors of both maps.
+fn positions_of(positions: Option<PositionsOfBoth<'_>>) -> PyResult<[Option<Vec<Point>>; 2]> {
+    let points_of = |points: &Bound<'_, PyAny>| -> PyResult<Vec<Point>> {
+        Ok(Points::of("positions", points)?.slice()?.to_vec())
+    };
+    let (of_before, of_after) = positions.unwrap_or_default();
+    let [of_before, of_after] =
+        [of_before, of_after].map(|points| points.as_ref().map(points_of).transpose());
+    Ok([of_before?, of_after?])
+}
+
+/// A comparison to be made.
+struct Asked {
+    places: [Place; 2],
+    options: CompareOptions,
+    positions: [Option<Vec<Point>>; 2],
+}
+
+/// A comparison with opened maps.
+struct Opened {
+    sides: [Side; 2],
+    options: CompareOptions,
+}
+
+impl Asked {
+    fn of(py: Python<'_>, places: [MapOrSnapshot; 2], options: &Bound<'_, PyDict>) -> PyResult<Self> {
+        let positions = options.get_item("positions")?.filter(|positions| !positions.is_none());
+        let positions = positions.map(|positions| positions.extract::<PositionsOfBoth<'_>>()).transpose()?;
+        let keywords = options.copy()?;
+        if keywords.contains("positions")? {
+            keywords.del_item("positions")?;
+        }
+        let mut keywords = Keywords::of(&keywords)?;
+        let mut options = CompareOptions::default()
+            .with_tolerance(keywords.number("tolerance")?)
+            .with_region(region(py, &mut keywords, "region")?)
+            .with_memory(keywords.bytes("memory")?.unwrap_or(DEFAULT_BYTES));
+        if let Some(certainty) = keywords.number("certainty")? {
+            options = options.with_certainty(certainty);
+        }
+        if let Some(voxels) = keywords.count("min_voxels")? {
+            options = options.with_min_voxels(voxels);
+        }
+        keywords.end()?;
+        Ok(Self { places: places.map(Place::At), options, positions: positions_of(positions)? })
+    }
+
+    fn open(&self, stop: &Stop) -> Result<Opened> {
+        let sides = [self.places[0].open()?, self.places[1].open()?];
+        let viewpoints =
+            [viewpoints(&sides[0], &self.positions[0])?, viewpoints(&sides[1], &self.positions[1])?];
+        let options = self.options.clone().with_viewpoints(viewpoints).with_stop(stop.clone());
+        Ok(Opened { sides, options })
+    }
 }
 
 /// Returns the positions of a map's sensor: those given, or else those of its kept scans.
@@ -140,26 +250,42 @@ pub struct Comparison {
     warnings: Vec<String>,
 }
 
-impl Comparison {
-    fn of(sides: [Side; 2], options: CompareOptions, progress: &Progress<'_>) -> Result<Self> {
-        let stop = options.stop.clone();
-        let sources = [&*sides[0].source, &*sides[1].source];
-        let (found, states, grid, crs, warnings) =
-            Source::ask_both(sources, &stop, |[before, after], states| {
-                let maps = [(&sides[0], before), (&sides[1], after)].map(|(side, map)| ComparedMap {
-                    path: &side.name,
-                    config: map.config(),
-                    tile_bounds: map.tile_bounds(),
-                    extension: side.extension.as_ref(),
-                });
-                let crs = check_crs(maps)?;
-                let report = |done, all| progress.report(done, all);
-                let found = voxtile_compare::compare(before, after, &options, &report)?;
-                Ok((found, states, before.config().grid, crs, warnings_of(maps)))
-            })?;
-        Ok(Self { found, options, sides, states, grid, crs, warnings })
+impl Opened {
+    /// Both maps for checks of their frames and rules.
+    fn compared_maps<'a>(
+        &'a self,
+        configs: [&'a MapConfig; 2],
+        bounds: [Option<TileBox>; 2],
+    ) -> [ComparedMap<'a>; 2] {
+        [0, 1].map(|k| ComparedMap {
+            path: &self.sides[k].name,
+            config: configs[k],
+            tile_bounds: bounds[k],
+            extension: self.sides[k].extension.as_ref(),
+        })
     }
 
+    /// Compares with `compare`.
+    fn compared(
+        self,
+        compare: impl Fn(&View<'_>, &View<'_>, &CompareOptions) -> Result<voxtile_compare::Comparison>,
+    ) -> Result<Comparison> {
+        let stop = self.options.stop.clone();
+        let sources = [&*self.sides[0].source, &*self.sides[1].source];
+        let (found, states, grid, crs, warnings) =
+            Source::ask_both(sources, &stop, |[before, after], states| {
+                let bounds = [before.tile_bounds(), after.tile_bounds()];
+                let maps = self.compared_maps([before.config(), after.config()], bounds);
+                let crs = check_crs(maps)?;
+                let found = compare(before, after, &self.options)?;
+                Ok((found, states, before.config().grid, crs, warnings_of(maps)))
+            })?;
+        let Self { sides, options } = self;
+        Ok(Comparison { found, options, sides, states, grid, crs, warnings })
+    }
+}
+
+impl Comparison {
     /// Returns the centers and classes of voxels; those of one change, or all. `None` if a map has changed.
     fn collect(&self, change: Option<u32>, stop: &Stop) -> Result<Option<Collected>> {
         let options = self.options.clone().with_stop(stop.clone());

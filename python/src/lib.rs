@@ -51,7 +51,7 @@ mod _voxtile {
     #[pymodule_export]
     use super::command::run_command;
     #[pymodule_export]
-    use super::compare::{Change, Comparison, compare};
+    use super::compare::{Change, Comparison, compare, compare_part, join_parts};
     #[pymodule_export]
     use super::distance::{DistanceField, compute_distances};
     #[pymodule_export]

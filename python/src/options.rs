@@ -187,7 +187,7 @@ fn no_stream(path: &Path) -> PathBuf {
     if path.as_os_str() == "-" { Path::new(".").join(path) } else { path.to_owned() }
 }
 
-fn region(py: Python<'_>, keywords: &mut Keywords<'_>, name: &'static str) -> PyResult<Option<Aabb>> {
+pub fn region(py: Python<'_>, keywords: &mut Keywords<'_>, name: &'static str) -> PyResult<Option<Aabb>> {
     let corners = keywords.numbers(name)?;
     corners.map(|corners| region_of(name, &corners)).transpose().map_err(|error| exception(py, &error))
 }

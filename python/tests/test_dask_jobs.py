@@ -209,3 +209,38 @@ def test_threads_of_a_worker_open_separate_maps(tmp_path: Path) -> None:
 
     found = voxtile_dask.map_tiles(source, look, tiles=[tile for tile in tiles[:3] for _ in range(16)])
     assert found.npartitions == 3 and all(found.compute(scheduler="threads", num_workers=2))
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        {"certainty": 0.55, "min_voxels": 1},
+        {"tolerance": 0.0, "min_voxels": 1, "certainty": 0.6, "region": [-3, -9, -9, 3, 9, 9]},
+    ],
+)
+def test_comparisons_by_many_workers_are_those_of_one(
+    client: object, options: dict[str, object], tmp_path: Path
+) -> None:
+    # Blocks of 128 voxels, and more of them than of tiles.
+    options = {"memory": "100MB", **options}
+    before, after = (
+        _map(tmp_path / name, seed, shift, resolution=0.05, keep_scans=True)
+        for name, seed, shift in (("before", 3, 0.0), ("after", 4, 1.3))
+    )
+    whole = voxtile.compare(before, after, **options)
+    assert whole.counts["vanished"]["voxels"] > 0 and whole.changes
+    seen = []
+    for parts in None, 1, 3, 400:
+        found = voxtile_dask.compare(
+            before, after, parts=parts, client=client, progress=lambda done, all: seen.append((done, all)), **options
+        )
+        assert found.to_dict() == whole.to_dict()
+        for one, other in zip(found.voxels(), whole.voxels(), strict=True):
+            assert (one == other).all()
+    assert (400, 400) in seen
+    with pytest.raises(errors.ArgumentError, match="parts"):
+        voxtile_dask.compare(before, after, parts=0, client=client)
+    with pytest.raises(errors.ArgumentError, match="tolerence"):
+        voxtile_dask.compare(before, after, client=client, tolerence=1.0)
+    with pytest.raises(errors.NoMapError):
+        voxtile_dask.compare(before, tmp_path / "missing", client=client)

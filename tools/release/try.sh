@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
 # Unpacks an archive of tools/release/run.sh into a temporary folder and runs its binaries there: try.sh ARCHIVE
 #
-# Binaries for another architecture run under qemu-user-static (Debian package), if it is installed.
+# Binaries for another architecture run under qemu-user-static (Debian package), if it is installed. Those for glibc also
+# need the libraries of that architecture below QEMU_LD_PREFIX (default: those of libc6-ARCH-cross).
 set -euo pipefail
 fail() { echo "release: $*" >&2 && exit 1; }
 archive=$(realpath "$1")
@@ -17,6 +18,11 @@ if [[ $cpu != $(uname -m) ]]; then
         echo "release: $archive: not tried; qemu-$cpu-static is not installed"
         exit 0
     }
+    export QEMU_LD_PREFIX=${QEMU_LD_PREFIX:-/usr/$cpu-linux-gnu}
+    if [[ $archive != *-musl.tar.gz ]] && ! compgen -G "$QEMU_LD_PREFIX/lib/ld-linux-*" >/dev/null; then
+        echo "release: $archive: not tried; QEMU_LD_PREFIX names no folder with glibc for $cpu"
+        exit 0
+    fi
 fi
 
 for program in voxtile voxtile-share voxtile-ros2; do
@@ -27,11 +33,11 @@ for program in voxtile voxtile-share voxtile-ros2; do
         fail "$program needs a glibc newer than 2.17"
     fi ;;
     esac
-    echo "$program: $(stat --format=%s "bin/$program") bytes, $("${emulator[@]}" "bin/$program" --version)"
+    echo "$program: $(stat --format=%s "bin/$program") bytes, $("${emulator[@]}" "bin/$program" --version | head -1)"
 done
 
 # Runs without the repository, cargo and the libraries of this machine: in a chroot if permitted.
-run() { env --ignore-environment PATH="$place/bin" "${emulator[@]}" "bin/$1" "${@:2}"; }
+run() { env --ignore-environment PATH="$place/bin" QEMU_LD_PREFIX="${QEMU_LD_PREFIX:-}" "${emulator[@]}" "bin/$1" "${@:2}"; }
 if [[ ${#emulator[@]} -eq 0 && $archive == *-musl.tar.gz ]] && unshare --map-root-user true 2>/dev/null; then
     mkdir --parents tmp
     programs=("$(command -v unshare)" --map-root-user "$(command -v chroot)" "$place")

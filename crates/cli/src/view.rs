@@ -9,9 +9,12 @@ use voxtile_compare::CompareOptions;
 use voxtile_view::{CompareWith, View, ViewOptions};
 
 pub fn run(args: &ViewArgs) -> anyhow::Result<ExitCode> {
+    let mut options = CompareOptions::default().with_tolerance(args.tolerance);
+    options = args.min_voxels.map_or(options.clone(), |voxels| options.with_min_voxels(voxels));
+    options = args.certainty.map_or(options.clone(), |certainty| options.with_certainty(certainty));
     let compare = args.compare.clone().map(|map| CompareWith {
         map,
-        options: CompareOptions::default().with_tolerance(args.tolerance),
+        options,
         progress: bar(|_| Progress::over_blocks()),
     });
     let view = View::open(&ViewOptions {

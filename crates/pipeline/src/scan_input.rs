@@ -164,6 +164,7 @@ impl ScanInputs {
     }
 
     /// Returns the inputs to change them.
+    #[cfg(feature = "bucket")]
     pub(crate) fn inputs_mut(&mut self) -> &mut [ScanInput] {
         &mut self.inputs
     }

@@ -26,6 +26,7 @@ __all__ = [
     "clean",
     "clear",
     "compare",
+    "compare_part",
     "compute_distances",
     "convert",
     "count_scans",
@@ -38,6 +39,7 @@ __all__ = [
     "forget_old",
     "import_octree",
     "join",
+    "join_parts",
     "merge",
     "move_shard",
     "open_scans",
@@ -386,6 +388,12 @@ def compare(
     positions: tuple[ArrayLike | None, ArrayLike | None] | None = None,
     memory: int | str | None = None,
     progress: _Progress | None = None,
+) -> Comparison: ...
+def compare_part(
+    before: _MapOrSnapshot, after: _MapOrSnapshot, part: int, parts: int, options: Mapping[str, Any]
+) -> bytes: ...
+def join_parts(
+    before: _MapOrSnapshot, after: _MapOrSnapshot, parts: Sequence[bytes], options: Mapping[str, Any]
 ) -> Comparison: ...
 def compute_distances(
     map: _MapOrSnapshot,

@@ -14,6 +14,13 @@ pub struct ViewArgs {
     /// voxels [default: one voxel]
     #[arg(long, value_name = "M", requires = "compare")]
     pub tolerance: Option<f64>,
+    /// With --compare: number of connected voxels from which on a change is listed [default: 8]
+    #[arg(long, value_name = "N", requires = "compare")]
+    pub min_voxels: Option<u64>,
+    /// With --compare: probability, above 0.5, with which one map must know a changed voxel as occupied and the other as
+    /// free [default: 0.7]
+    #[arg(long, value_name = "P", requires = "compare")]
+    pub certainty: Option<f64>,
     /// Address and port of the server; port 0 selects a free one. Use 0.0.0.0:8000 for access from other machines: any
     /// client with the token can read the maps, unencrypted
     #[arg(long, value_name = "ADDRESS", default_value = "127.0.0.1:0")]

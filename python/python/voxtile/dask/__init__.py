@@ -5,7 +5,20 @@
 
 from .building import BuildOptions, build
 from .columns import decay, merge, verify
+from .comparing import CompareOptions, compare
 from .jobs import export, statistics
 from .tiles import Tile, map_tiles
 
-__all__ = ["BuildOptions", "Tile", "build", "decay", "export", "map_tiles", "merge", "statistics", "verify"]
+__all__ = [
+    "BuildOptions",
+    "CompareOptions",
+    "Tile",
+    "build",
+    "compare",
+    "decay",
+    "export",
+    "map_tiles",
+    "merge",
+    "statistics",
+    "verify",
+]
