@@ -33,7 +33,7 @@ for program in voxtile voxtile-share voxtile-ros2; do
         fail "$program needs a glibc newer than 2.17"
     fi ;;
     esac
-    echo "$program: $(stat --format=%s "bin/$program") bytes, $("${emulator[@]}" "bin/$program" --version | head -1)"
+    echo "$program: $(stat --format=%s "bin/$program") bytes, $("${emulator[@]}" "bin/$program" --version)"
 done
 
 # Runs without the repository, cargo and the libraries of this machine: in a chroot if permitted.
