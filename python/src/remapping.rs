@@ -11,8 +11,9 @@ use pyo3::types::PyDict;
 use std::path::PathBuf;
 use voxtile::mapper::KeptSummary;
 use voxtile::operations::{self, NewPoses, Remap, Replay, ScanSelection};
-use voxtile::{InsertMode, MapView};
+use voxtile::{Error, InsertMode, MapView};
 use voxtile_clean::Clean;
+use voxtile_pipeline::interpolated_poses;
 
 /// Returns the options common to all replays.
 fn replay_of(
@@ -29,9 +30,11 @@ fn replay_of(
 /// it had been built with these poses.
 ///
 /// `poses` is one pose per scan in order (N x 4 x 4, N x 7, or a list of poses as `Map.insert` takes them), or a dict
-/// of scan numbers and poses. Scans that move and turn by at most `tolerance` (metres, degrees) keep their poses.
+/// of scan numbers and poses: other scans keep theirs, or with `interpolate` their motion relative to the two around
+/// them in the dict. Scans that move and turn by at most `tolerance` (metres, degrees) keep their poses.
 #[pyfunction]
-#[pyo3(signature = (map, poses, *, tolerance=None, keep_as=None, dry_run=false, memory=None, progress=None))]
+#[pyo3(signature = (map, poses, *, tolerance=None, keep_as=None, dry_run=false, interpolate=false, memory=None,
+    progress=None))]
 #[expect(clippy::too_many_arguments, reason = "keywords, in Python")]
 pub fn remap<'py>(
     py: Python<'py>,
@@ -40,6 +43,7 @@ pub fn remap<'py>(
     tolerance: Option<(f64, f64)>,
     keep_as: Option<&str>,
     dry_run: bool,
+    interpolate: bool,
     memory: Option<Bound<'py, PyAny>>,
     progress: Callback,
 ) -> PyResult<Bound<'py, PyAny>> {
@@ -54,9 +58,15 @@ pub fn remap<'py>(
     let tolerance = tolerance.map(|(moved_m, turned_deg)| (moved_m, turned_deg.to_radians()));
     reported(py, progress, |stop, progress| {
         let how = Remap::new(how.with_stop(stop.clone())).with_tolerance(tolerance);
-        operations::remap(&KeptSummary::read(folder_of(&map)?)?, &poses, &how, |done, all| {
-            progress.report(done, all)
-        })
+        let scans = KeptSummary::read(folder_of(&map)?)?;
+        let poses = match &poses {
+            NewPoses::Numbered(some) if interpolate => &interpolated_poses(&scans, some)?,
+            _ if interpolate => {
+                return Err(Error::argument("interpolate", "needs a dict of scan numbers and poses"));
+            }
+            poses => poses,
+        };
+        operations::remap(&scans, poses, &how, |done, all| progress.report(done, all))
     })
 }
 

@@ -172,5 +172,6 @@ fn pose_file<'a>(args: &'a RemapArgs, path: &'a Path) -> voxtile::Result<PoseFil
     // Next to the map, as in builds: the system's temporary folder may be in memory.
     let scratch = args.map.ancestors().skip(1).find(|folder| folder.is_dir()).unwrap_or(Path::new("."));
     let budget = Budget { scratch: Some(scratch.to_owned()), ..Budget::default() };
-    Ok(PoseFile { path, calib: args.calib.as_deref(), body_from_sensor, tolerance_ns, budget })
+    let which = args.interpolate.unwrap_or_default();
+    Ok(PoseFile { path, calib: args.calib.as_deref(), body_from_sensor, tolerance_ns, budget, which })
 }

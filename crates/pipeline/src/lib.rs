@@ -10,6 +10,7 @@
 //! write_distances_npz, write_distances_png                          distance_files
 //! Comparison of two maps -> lists, files of voxels, warnings        changes/
 //! read_moving_points: marked points of kept scans                    moving_points
+//! PoseFile -> poses_for -> new poses of kept scans                   new_poses, sparse_poses
 //! scan_digest: a digest of kept scans                                scan_digest
 //! numbers: lists of numbers used by all front ends                  numbers
 //! PolygonFile: an area of GeoJSON                                   polygon_file
@@ -47,6 +48,7 @@ mod scan_input;
 mod scan_place;
 mod scan_queue;
 mod scan_reader;
+mod sparse_poses;
 mod summary;
 mod watch;
 
@@ -70,11 +72,12 @@ pub use map_at::{
     read_maps, whole_map,
 };
 pub use moving_points::read_moving_points;
-pub use new_poses::{PoseFile, poses_for};
+pub use new_poses::{PoseFile, WhichScans, poses_for};
 pub use polygon_file::PolygonFile;
 pub use scan_digest::scan_digest;
 pub use scan_input::{ScanInput, ScanInputs, is_standard_input, open_paths};
 pub use scan_place::LocalScans;
 pub use scan_queue::WhenBehind;
+pub use sparse_poses::interpolated_poses;
 pub use summary::{OctreeWork, Summary};
 pub use watch::{Gauge, Listener, MakeGauge, Unit, Watch};

@@ -1,3 +1,4 @@
+use crate::sparse_poses::interpolated_poses;
 use std::path::Path;
 use voxtile::mapper::{KeptScanHead, KeptSummary};
 use voxtile::operations::NewPoses;
@@ -23,6 +24,20 @@ pub struct PoseFile<'a> {
     pub tolerance_ns: i64,
     /// Memory budget for reading.
     pub budget: Budget,
+    /// Whether the file may have the poses of some scans alone.
+    pub which: WhichScans,
+}
+
+/// Scans that a pose file has poses for.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum WhichScans {
+    /// All scans.
+    #[default]
+    All,
+    /// Those with a pose at their time stamp; the others move with them ([`interpolated_poses`]).
+    Stamped,
+    /// Every n-th scan from the first on; the others move with them.
+    Every(u64),
 }
 
 impl<'a> PoseFile<'a> {
@@ -35,19 +50,22 @@ impl<'a> PoseFile<'a> {
             body_from_sensor: (body != RigidPose::IDENTITY).then_some(body),
             tolerance_ns: options.clouds.pose_tolerance_ns,
             budget: options.budget(),
+            which: WhichScans::All,
         })
     }
 }
 
-/// Returns the poses of a file for the scans that a map keeps, as a build with this file would assign them.
+/// Returns the poses of a file for the scans that a map keeps, as a build with this file would assign them, or those of
+/// all scans from a file with the poses of some.
 ///
 /// # Errors
 ///
 /// The map does not keep all its scans, the file cannot be read, or its poses do not fit the scans.
 pub fn poses_for(from: &PoseFile<'_>, scans: &KeptSummary) -> Result<NewPoses> {
     scans.check_keeps_all()?;
+    let summary = scans;
     let scans = scans.scans();
-    let &PoseFile { path: file, calib, body_from_sensor, tolerance_ns, ref budget } = from;
+    let &PoseFile { path: file, calib, body_from_sensor, tolerance_ns, ref budget, which } = from;
     if std::fs::metadata(file).is_ok_and(|meta| !meta.is_file() && !meta.is_dir()) {
         let reason = "is a FIFO, a socket or a device, but new poses may be read twice: save them to a file";
         return Err(Error::argument(file.display().to_string(), reason));
@@ -56,6 +74,10 @@ pub fn poses_for(from: &PoseFile<'_>, scans: &KeptSummary) -> Result<NewPoses> {
     // Equal stamps, for instance all 0, are ignored.
     if trajectory.span_ns()?.is_none_or(|[first, last]| first < last) {
         trajectory.remarks().iter().for_each(|remark| log::warn!("{}: {remark}", file.display()));
+    }
+    if which != WhichScans::All {
+        let some = poses_of_some(&trajectory, file, scans, which, body_from_sensor.as_ref())?;
+        return interpolated_poses(summary, &some);
     }
     let have_stamps = scans.iter().all(|scan| scan.stamp_ns.is_some());
     // Poses that are not sorted by time can only be matched by stamp.
@@ -81,6 +103,46 @@ pub fn poses_for(from: &PoseFile<'_>, scans: &KeptSummary) -> Result<NewPoses> {
         return Err(Error::argument(file.display().to_string(), reason));
     }
     by_time(&trajectory, file, scans, tolerance_ns, body_from_sensor.as_ref())
+}
+
+/// Returns the poses of a part of the scans, by their numbers.
+fn poses_of_some(
+    trajectory: &Trajectory,
+    file: &Path,
+    scans: &[KeptScanHead],
+    which: WhichScans,
+    body_from_sensor: Option<&RigidPose>,
+) -> Result<Vec<(u64, Pose)>> {
+    let wrong = |reason: String| Error::argument(file.display().to_string(), reason);
+    let mut some = Vec::new();
+    if let WhichScans::Every(step) = which {
+        let step = usize::try_from(step.max(1)).unwrap_or(usize::MAX);
+        let wanted = scans.len().div_ceil(step);
+        if trajectory.len() != wanted {
+            let (poses, all) = (trajectory.len(), scans.len());
+            return Err(wrong(format!(
+                "{poses} poses, but every {step}th of {all} kept scans are {wanted}; give another step, or poses with \
+                 time stamps"
+            )));
+        }
+        for (number, scan) in scans.iter().step_by(step).enumerate() {
+            if let Some(pose) = trajectory.by_number(number)? {
+                some.push((scan.number, sensor_pose(&pose, body_from_sensor)?));
+            }
+        }
+        return Ok(some);
+    }
+    for scan in scans {
+        // Poses between two are worse than what the scan did since the one before.
+        let found = scan.stamp_ns.map(|stamp_ns| trajectory.at(stamp_ns, 0)).transpose()?;
+        if let Some(Found::Exact(pose)) = found {
+            some.push((scan.number, sensor_pose(&pose, body_from_sensor)?));
+        }
+    }
+    match some.is_empty() {
+        true => Err(wrong("no kept scan has a pose within a millisecond of its time stamp".to_owned())),
+        false => Ok(some),
+    }
 }
 
 /// Returns whether pose `k` can belong to scan `k` for all `k`: no stamps differ by more than the tolerance.

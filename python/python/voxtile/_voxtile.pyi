@@ -362,6 +362,7 @@ def remap(
     tolerance: tuple[float, float] | None = None,
     keep_as: str | None = None,
     dry_run: bool = False,
+    interpolate: bool = False,
     memory: int | str | None = None,
     progress: _Progress | None = None,
 ) -> dict[str, Any]: ...

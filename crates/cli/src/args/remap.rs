@@ -4,6 +4,7 @@ use clap::Args;
 use std::path::PathBuf;
 use voxtile::Layers;
 use voxtile::store::SnapshotName;
+use voxtile_pipeline::WhichScans;
 
 /// Options of all commands that replay kept scans.
 #[derive(Debug, Args)]
@@ -17,6 +18,14 @@ pub struct ReplayArgs {
     pub memory: Option<ByteSize>,
     #[arg(long, help = help::JSON)]
     pub json: bool,
+}
+
+fn which_scans(text: &str) -> Result<WhichScans, String> {
+    match text.parse() {
+        _ if text == "stamps" => Ok(WhichScans::Stamped),
+        Ok(0) | Err(_) => Err("a number of scans from 1 is needed".to_owned()),
+        Ok(step) => Ok(WhichScans::Every(step)),
+    }
 }
 
 #[derive(Debug, Args)]
@@ -43,6 +52,11 @@ pub struct RemapArgs {
     pub extrinsic: Option<Vec<f64>>,
     #[arg(long, value_name = "S", default_value_t = 0.5, help = help::POSE_TOLERANCE)]
     pub pose_tolerance: f64,
+    /// The file has the poses of some scans: those with a pose within a millisecond of their time stamp, or every N-th
+    /// from the first on. The others keep their motion relative to the two around them
+    #[arg(long, value_name = "N", requires = "poses", num_args = 0..=1, require_equals = true,
+        default_missing_value = "stamps", value_parser = which_scans)]
+    pub interpolate: Option<WhichScans>,
     /// Ignore moves and turns up to this size, such as 0.02m,0.1deg
     #[arg(long, value_name = "METRES,DEGREES", requires = "poses")]
     pub tolerance: Option<String>,

@@ -89,6 +89,77 @@ fn a_remapped_map_equals_a_build_with_the_new_poses() {
     assert!(reported.contains("0 scans moved"), "{reported}");
 }
 
+/// Poses of the first and third scan, which move by 0 and 0.6 m: the second follows by half of that.
+#[test]
+fn scans_without_a_new_pose_follow_their_neighbors() {
+    let kept = Kept::new();
+    let moved = kept.poses("moved.txt", 0.3);
+    let wanted = kept.digest_with(&moved, "again");
+    let graph = |path: &str, ids: &[usize]| {
+        let text = fs::read_to_string(&moved).unwrap();
+        let lines: Vec<_> = text.lines().collect();
+        let mut graph = "PARAMS_SE3OFFSET 0 0 0 0 0 0 0 1\n".to_owned();
+        for &id in ids {
+            let rows: Vec<f64> = lines[id].split(' ').map(|word| word.parse().unwrap()).collect();
+            let pose = voxtile::Pose::from_matrix(
+                &rows.chunks(4).map(|row| row.try_into().unwrap()).collect::<Vec<[f64; 4]>>(),
+            );
+            let pose = pose.unwrap();
+            let numbers = [&pose.position_m()[..], &pose.quaternion()].concat();
+            let numbers: Vec<_> = numbers.iter().map(f64::to_string).collect();
+            graph += &format!("VERTEX_SE3:QUAT {id} {}\n", numbers.join(" "));
+        }
+        graph += "FIX 0\nEDGE_SE3:QUAT 0 2 1 0 0 0 0 0 1 1 0 0\n";
+        fs::write(path, graph).unwrap();
+    };
+    let file = kept.path("graph.g2o");
+    graph(&file, &[0, 2]);
+    let message = fails(&["remap", &kept.map, "--poses", &file], 2);
+    assert!(message.contains("2 poses for 3 kept scans"), "{message}");
+    let message = fails(&["remap", &kept.map, "--poses", &file, "--interpolate=3"], 2);
+    assert!(message.contains("every 3th of 3 kept scans are 1"), "{message}");
+    let message = fails(&["remap", &kept.map, "--poses", &file, "--interpolate"], 2);
+    assert!(message.contains("within a millisecond"), "{message}");
+    fails(&["remap", &kept.map, "--poses", &file, "--interpolate=0"], 2);
+    let done = json(&["remap", &kept.map, "--poses", &file, "--interpolate=2", "--json"]);
+    assert!((done["largest_move_m"].as_f64().unwrap() - 0.6).abs() < 1e-9, "{done}");
+    assert_eq!(digest(&kept.map), wanted);
+    // All poses of a graph are those of the scans in order.
+    let whole = kept.path("whole.g2o");
+    graph(&whole, &[0, 1, 2]);
+    assert_eq!(kept.digest_with(&whole, "of_graph"), wanted);
+    graph(&whole, &[0, 2, 1]);
+    let message = fails(&["remap", &kept.map, "--poses", &whole], 2);
+    assert!(message.contains("vertex 1 follows vertex 2"), "{message}");
+}
+
+#[test]
+fn cropped_and_merged_maps_keep_scans() {
+    let kept = Kept::new();
+    let everywhere = ["--region", "-99", "-99", "-99", "99", "99", "99"];
+    let part = kept.path("part");
+    output(&[&["crop", &kept.map, "-o", &part, "--keep-scans"][..], &everywhere].concat());
+    let of_scans = |map: &str| output(&["digest", map, "--scans"]);
+    assert_eq!((digest(&part), of_scans(&part)), (digest(&kept.map), of_scans(&kept.map)));
+    let moved = kept.poses("moved.txt", 0.3);
+    output(&["remap", &part, "--poses", &moved]);
+    assert_eq!(digest(&part), kept.digest_with(&moved, "again"));
+    assert_ne!(of_scans(&part), of_scans(&kept.map));
+    let bare = kept.path("bare");
+    output(&[&["crop", &kept.map, "-o", &bare][..], &everywhere].concat());
+    for arguments in [
+        vec!["digest", &bare, "--scans"],
+        [&["crop", &bare, "-o", &kept.path("x"), "--keep-scans"][..], &everywhere].concat(),
+    ] {
+        let message = fails(&arguments, 2);
+        assert!(message.contains("keeps no scans"), "{message}");
+    }
+    let both = kept.path("both");
+    let merged = json(&["merge", &kept.map, &part, "-o", &both, "--json"]);
+    assert_eq!(merged["keeps_scans"], true, "{merged}");
+    assert_eq!(json(&["scans", &both, "--json"])["scans"], 6);
+}
+
 /// The original map does not change; another one has the new poses.
 #[test]
 fn another_map_is_built_from_kept_scans_with_other_poses() {

@@ -14,7 +14,7 @@ const IDENTITY: &str = "identity";
 /// Maximum number of files named in an error.
 const MAX_NAMED: usize = 4;
 /// Extensions of possible pose files.
-const POSE_EXTENSIONS: [&str; 4] = ["txt", "tum", "kitti", "csv"];
+const POSE_EXTENSIONS: [&str; 5] = ["txt", "tum", "kitti", "csv", "g2o"];
 /// Number of bytes read to detect whether a file contains poses.
 const GLANCE_BYTES: u64 = 1 << 14;
 

@@ -7,6 +7,7 @@ mod cells;
 mod deskew;
 mod direction;
 mod find_poses;
+mod g2o;
 mod gap;
 mod header;
 mod matrix;

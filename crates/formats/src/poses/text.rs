@@ -1,6 +1,7 @@
 use super::RigidPose;
 use super::binary::check_text;
 use super::cells::{Cells, cells, numbers, stamp_of_two, starts_with_number};
+use super::g2o::{GraphLine, vertex};
 use super::header::{Names, Roles, TimeColumns};
 use super::matrix::matrix_of;
 use super::pose_input::PoseInput;
@@ -25,6 +26,8 @@ enum Layout {
     Matrix { has_time: bool },
     /// A 4x4 matrix on four lines. Some programs store the time in the corner that is otherwise 1.
     Rows,
+    /// A pose graph of g2o.
+    Graph,
 }
 
 /// How strictly lines of numbers are interpreted.
@@ -101,7 +104,8 @@ pub(crate) fn looks_like_poses(start: &[u8]) -> bool {
 const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
 /// Supported forms of a pose, for messages.
 const FORMS: &str = "8 numbers (TUM: t x y z qx qy qz qw), 7 without t, 12 or 16 (a 3x4 or 4x4 matrix, as in KITTI), \
-                     one more if a time precedes the matrix, or a table with a header line";
+                     one more if a time precedes the matrix, a table with a header line, or a pose graph of g2o \
+                     (VERTEX_SE3:QUAT)";
 
 /// Content of a line.
 enum Taken {
@@ -132,6 +136,8 @@ struct TextPoses {
     matrix: Vec<f64>,
     /// The first problem within this matrix.
     matrix_fault: Option<BadRow>,
+    /// Id of the last vertex of a pose graph.
+    last_id: Option<u64>,
 }
 
 impl TextPoses {
@@ -145,6 +151,7 @@ impl TextPoses {
             digits: None,
             matrix: Vec::new(),
             matrix_fault: None,
+            last_id: None,
         }
     }
 
@@ -172,6 +179,11 @@ impl TextPoses {
             }
             return Ok(Taken::Nothing);
         }
+        if let Some(found) = GraphLine::of(line)
+            && matches!(self.layout, None | Some(Layout::Graph))
+        {
+            return self.take_graph_line(&found);
+        }
         if !starts_with_number(line) {
             let found = if self.layout.is_none() { Names::of(line) } else { Names::Prose };
             return match found {
@@ -187,6 +199,30 @@ impl TextPoses {
             };
         }
         self.take_numbers(line)
+    }
+
+    fn take_graph_line(&mut self, line: &GraphLine<'_>) -> Result<Taken, Bad> {
+        self.layout = Some(Layout::Graph);
+        self.are_plain = false;
+        let words = match line {
+            GraphLine::Pose(words) => words,
+            GraphLine::OtherPose(tag) => {
+                return Err(Bad::File(format!(
+                    "`{tag}` is a pose in the plane or with angles; save VERTEX_SE3:QUAT, or the poses as TUM"
+                )));
+            }
+            GraphLine::Other => return Ok(Taken::Nothing),
+        };
+        let (id, pose) = vertex(words).map_err(Bad::File)?;
+        if let Some(last) = self.last_id.filter(|last| *last >= id) {
+            return Err(Bad::File(format!(
+                "vertex {id} follows vertex {last}: sort the vertices by their ids, because poses are assigned in \
+                 order"
+            )));
+        }
+        self.last_id = Some(id);
+        let row = |pose| Taken::Row(Row { stamp: Stamp::None, pose, has_unnamed_quaternion: false });
+        pose.map(row).map_err(Bad::Row)
     }
 
     /// Stores the column names of a line. Prose does not replace them.
@@ -239,7 +275,7 @@ impl TextPoses {
             Layout::Tum | Layout::Bare => !line.contains([';', '|']),
             Layout::Matrix { has_time } => !has_time && words.len() == 12 && !line.contains([';', '|']),
             Layout::Named(roles) => roles.are_those_of_tum() && words.len() == 8 && !self.has_header,
-            Layout::Rows => false,
+            Layout::Rows | Layout::Graph => false,
         };
         let cells = Cells { words, separator: Separator::of(line) };
         let taken = self.take_cells(&layout, &cells);
@@ -252,7 +288,7 @@ impl TextPoses {
     fn take_cells(&mut self, layout: &Layout, cells: &Cells<'_>) -> Result<Taken, Bad> {
         let rules = if self.are_plain { self.rules } else { Rules::Strict };
         let columns = match layout {
-            Layout::Named(_) | Layout::Rows => None,
+            Layout::Named(_) | Layout::Rows | Layout::Graph => None,
             Layout::Tum => Some(8),
             Layout::Bare => Some(7),
             Layout::Matrix { has_time } => Some(if *has_time { 13 } else { 12 }),
@@ -277,12 +313,15 @@ impl TextPoses {
                 stamp_of_two(cells, *seconds, *nanoseconds)
             }
             Layout::Tum | Layout::Matrix { has_time: true } => self.stamp(cells, 0, None),
-            Layout::Named(_) | Layout::Bare | Layout::Matrix { has_time: false } | Layout::Rows => {
-                Stamp::None
-            }
+            Layout::Named(_)
+            | Layout::Bare
+            | Layout::Matrix { has_time: false }
+            | Layout::Rows
+            | Layout::Graph => Stamp::None,
         };
         let pose = match layout {
             Layout::Rows => return self.take_matrix_line(cells),
+            Layout::Graph => Err((BadKind::Odd, "numbers without a tag in a pose graph".to_owned())),
             Layout::Named(Roles { position, units, quaternion, .. }) => {
                 let [px, py, pz] = *position;
                 let [qx, qy, qz, qw] = *quaternion;

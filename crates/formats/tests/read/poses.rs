@@ -311,6 +311,37 @@ fn kitti_camera_poses_are_converted_to_lidar_poses() {
 /// This reader and `Pose::from_matrix` must convert matrices to the same bits, so that a map built with one can be
 /// resumed with the other.
 #[test]
+fn pose_graphs_are_read_in_the_order_of_their_ids() {
+    let graph = "FIX 7\n\
+                 VERTEX_SE3:QUAT 0 1 2 3 0 0 0 1\n\
+                 VERTEX_TRACKXYZ 1 9 9 9\n\
+                 VERTEX_SE3:QUAT 8646911284551352321 4 5 6 0 0 0.7071067811865476 0.7071067811865476\n\
+                 EDGE_SE3:QUAT 0 8646911284551352321 3 3 3 0 0 0 1 1 0 0 0 0 0\n";
+    let trajectory = read(graph).unwrap();
+    assert_eq!((trajectory.len(), trajectory.has_stamps()), (2, false));
+    let last = trajectory.by_number(1).unwrap().unwrap();
+    assert_eq!((last.position_m, last.quaternion[3]), ([4.0, 5.0, 6.0], 0.5_f64.sqrt()));
+    for (text, words) in [
+        ("VERTEX_SE3:QUAT 1 0 0 0 0 0 0 1\nVERTEX_SE3:QUAT 0 0 0 0 0 0 0 1\n", "vertex 0 follows vertex 1"),
+        ("VERTEX_SE3:QUAT -1 0 0 0 0 0 0 1\n", "needs an id"),
+        ("VERTEX_SE3:QUAT\n", "needs an id"),
+        ("VERTEX_SE2 0 0 0 0\n", "VERTEX_SE2"),
+        ("VERTEX_SE3:QUAT 0 0 0 0 0 0\n", "vertex 0: 5 numbers"),
+        ("VERTEX_SE3:QUAT 0 0 0 0 1 1 1 1\n", "length 2.000"),
+        ("EDGE_SE3:QUAT 0 1 0 0 0 0 0 0 1\n", ""),
+    ] {
+        let message = format!("{:#}", read(text).unwrap_err());
+        assert!(message.contains(words), "{text}: {message}");
+    }
+    // A lost pose keeps its place.
+    let lost = "VERTEX_SE3:QUAT 0 nan 0 0 0 0 0 1\nVERTEX_SE3:QUAT 1 1 0 0 0 0 0 1\nVERTEX_SE3:QUAT 2 2 0 0 0 0 0 1\n";
+    let trajectory = read(lost).unwrap();
+    assert!(trajectory.by_number(0).unwrap().is_none() && trajectory.by_number(2).unwrap().is_some());
+    // Prose may begin like a graph.
+    assert_eq!(read("FIX the poses\n1 0 0 0 0 0 0 1\n2 0 0 0 0 0 0 1\n").unwrap().len(), 2);
+}
+
+#[test]
 fn matrices_give_bit_identical_poses_to_the_engine() {
     let (mut text, mut wanted) = (String::new(), Vec::new());
     let mut next = 1_u64;
