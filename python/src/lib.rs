@@ -69,7 +69,9 @@ mod _voxtile {
         verify,
     };
     #[pymodule_export]
-    use super::remapping::{clean, remap, remap_as, remove_points, remove_scans};
+    use super::remapping::{
+        clean, join_remap, remap, remap_as, remap_columns, remap_part, remove_points, remove_scans,
+    };
     #[pymodule_export]
     use super::report::InsertReport;
     #[pymodule_export]

@@ -6,12 +6,15 @@ use crate::layers::layers_of;
 use crate::map::region_of;
 use crate::operations::{Callback, MapOrSnapshot, folder_of, name_of, reported};
 use crate::pose::pose_of;
+use crate::watched::watched;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::path::PathBuf;
+use std::sync::Arc;
 use voxtile::mapper::KeptSummary;
-use voxtile::operations::{self, NewPoses, Remap, Replay, ScanSelection};
-use voxtile::{Error, InsertMode, MapView};
+use voxtile::operations::{self, NewPoses, Remap, RemapPart, Replay, ScanSelection};
+use voxtile::store::{FsDisk, UnsyncedDisk};
+use voxtile::{Error, InsertMode, MapPath, MapView, Result, TileBox};
 use voxtile_clean::Clean;
 use voxtile_pipeline::interpolated_poses;
 
@@ -47,26 +50,124 @@ pub fn remap<'py>(
     memory: Option<Bound<'py, PyAny>>,
     progress: Callback,
 ) -> PyResult<Bound<'py, PyAny>> {
-    let poses = match poses.cast::<PyDict>() {
+    let asked = Asked { map, poses: new_poses_of(poses)?, interpolate, tolerance };
+    let how = replay_of(py, keep_as, dry_run, memory.as_ref())?;
+    reported(py, progress, |stop, progress| {
+        let (scans, poses, how) = asked.read(how.with_stop(stop.clone()))?;
+        operations::remap(&scans, &poses, &how, |done, all| progress.report(done, all))
+    })
+}
+
+/// Converts poses: a dict of scan numbers and poses, or one pose per scan in order.
+fn new_poses_of(poses: &Bound<'_, PyAny>) -> PyResult<NewPoses> {
+    Ok(match poses.cast::<PyDict>() {
         Ok(numbered) => {
             let poses = numbered.iter().map(|(number, pose)| Ok((number.extract()?, pose_of(&pose)?)));
             NewPoses::Numbered(poses.collect::<PyResult<_>>()?)
         }
         Err(_) => NewPoses::InOrder(poses.try_iter()?.map(|pose| pose_of(&pose?)).collect::<PyResult<_>>()?),
-    };
-    let how = replay_of(py, keep_as, dry_run, memory.as_ref())?;
-    let tolerance = tolerance.map(|(moved_m, turned_deg)| (moved_m, turned_deg.to_radians()));
-    reported(py, progress, |stop, progress| {
-        let how = Remap::new(how.with_stop(stop.clone())).with_tolerance(tolerance);
-        let scans = KeptSummary::read(folder_of(&map)?)?;
-        let poses = match &poses {
-            NewPoses::Numbered(some) if interpolate => &interpolated_poses(&scans, some)?,
-            _ if interpolate => {
+    })
+}
+
+/// New poses for a map.
+struct Asked {
+    map: PathBuf,
+    poses: NewPoses,
+    interpolate: bool,
+    /// Metres and degrees.
+    tolerance: Option<(f64, f64)>,
+}
+
+impl Asked {
+    /// Reads the summary of the scans, and returns the poses of all that move.
+    fn read(&self, replay: Replay) -> Result<(KeptSummary, NewPoses, Remap)> {
+        let tolerance = self.tolerance.map(|(moved_m, turned_deg)| (moved_m, turned_deg.to_radians()));
+        let scans = KeptSummary::read(folder_of(&self.map)?)?;
+        let poses = match &self.poses {
+            NewPoses::Numbered(some) if self.interpolate => interpolated_poses(&scans, some)?,
+            _ if self.interpolate => {
                 return Err(Error::argument("interpolate", "needs a dict of scan numbers and poses"));
             }
-            poses => poses,
+            poses => poses.clone(),
         };
-        operations::remap(&scans, poses, &how, |done, all| progress.report(done, all))
+        Ok((scans, poses, Remap::new(replay).with_tolerance(tolerance)))
+    }
+}
+
+/// Columns of tiles, by their index in units of `tiles`, that new poses may change: the parts of a remap that several
+/// processes share.
+#[pyfunction]
+#[pyo3(signature = (map, poses, tiles, *, interpolate=false, tolerance=None))]
+pub fn remap_columns(
+    py: Python<'_>,
+    map: PathBuf,
+    poses: &Bound<'_, PyAny>,
+    tiles: u32,
+    interpolate: bool,
+    tolerance: Option<(f64, f64)>,
+) -> PyResult<Vec<(i32, i32)>> {
+    let asked = Asked { map, poses: new_poses_of(poses)?, interpolate, tolerance };
+    watched(py, |stop| {
+        let (scans, poses, how) = asked.read(Replay::default().with_stop(stop.clone()))?;
+        let columns = operations::remap_columns(&scans, &poses, &how, tiles)?;
+        Ok(columns.into_iter().map(Into::into).collect())
+    })
+}
+
+/// Replays the tiles of a column as a shard, `output`, which is durable after `move_shard`. Returns a text for
+/// `join_remap`. Without tiles to replay there is no shard.
+#[pyfunction]
+#[pyo3(signature = (map, poses, column, tiles, output, *, interpolate=false, tolerance=None, memory=None))]
+#[expect(clippy::too_many_arguments, reason = "keywords, in Python")]
+pub fn remap_part(
+    py: Python<'_>,
+    map: PathBuf,
+    poses: &Bound<'_, PyAny>,
+    column: [i32; 2],
+    tiles: u32,
+    output: PathBuf,
+    interpolate: bool,
+    tolerance: Option<(f64, f64)>,
+    memory: Option<Bound<'_, PyAny>>,
+) -> PyResult<String> {
+    let asked = Asked { map, poses: new_poses_of(poses)?, interpolate, tolerance };
+    let replay = replay_of(py, None, false, memory.as_ref())?;
+    watched(py, |stop| {
+        let (scans, poses, how) = asked.read(replay.with_stop(stop.clone()))?;
+        let disk = Arc::new(UnsyncedDisk::of(Arc::new(FsDisk)));
+        let output = MapPath::on(disk, folder_of(&output)?);
+        let region = TileBox::of_column(column, tiles);
+        let part = operations::remap_part(&scans, &poses, &how, region, output, |_, _| {})?;
+        serde_json::to_string(&part).map_err(|error| Error::argument("part", error.to_string()))
+    })
+}
+
+/// Applies new poses with the parts of all columns: the shard of each, if there is one, and its text. One commit changes
+/// the map.
+#[pyfunction]
+#[pyo3(signature = (map, poses, parts, *, interpolate=false, tolerance=None, keep_as=None, memory=None))]
+#[expect(clippy::too_many_arguments, reason = "keywords, in Python")]
+pub fn join_remap<'py>(
+    py: Python<'py>,
+    map: PathBuf,
+    poses: &Bound<'py, PyAny>,
+    parts: Vec<(Option<PathBuf>, String)>,
+    interpolate: bool,
+    tolerance: Option<(f64, f64)>,
+    keep_as: Option<&str>,
+    memory: Option<Bound<'py, PyAny>>,
+) -> PyResult<Bound<'py, PyAny>> {
+    let asked = Asked { map, poses: new_poses_of(poses)?, interpolate, tolerance };
+    let replay = replay_of(py, keep_as, false, memory.as_ref())?;
+    reported(py, None, |stop, _| {
+        let (scans, poses, how) = asked.read(replay.with_stop(stop.clone()))?;
+        let part = |(shard, text): &(Option<PathBuf>, String)| {
+            let part: RemapPart =
+                serde_json::from_str(text).map_err(|error| Error::argument("parts", error.to_string()))?;
+            Ok((shard.as_ref().map(MapPath::from), part))
+        };
+        let parts: Vec<_> = parts.iter().map(part).collect::<Result<_>>()?;
+        operations::join_remap(&scans, &poses, &how, &parts)
     })
 }
 

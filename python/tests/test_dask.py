@@ -97,6 +97,42 @@ def test_kept_scans_are_those_of_one_build(client: object, region_size: float, d
         assert digest(tmp_path / "map") == digest(tmp_path / "whole") == digest(tmp_path / "moved")
 
 
+@pytest.mark.parametrize("region_size", [None, 4.0, 10.0])
+def test_new_poses_by_many_workers(
+    client: object, region_size: float | None, drive: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    voxtile.build(drive, tmp_path / "map", keep_scans=True, **OPTIONS)
+    shutil.copytree(tmp_path / "map", tmp_path / "one")
+    rows = np.loadtxt(drive / "poses_kitti.txt").reshape(-1, 3, 4)
+    poses = np.concatenate([rows, np.broadcast_to([[[0, 0, 0, 1.0]]], (len(rows), 1, 4))], axis=1)
+    options = {"client": client, "region_size": region_size}
+    for moved in {9: 0.7}, dict.fromkeys(range(5, 12), 0.3), {0: 3.0, 1: -0.5}:
+        for number, by in moved.items():
+            poses[number, 0, 3] += by
+        # A failed commit leaves the finished parts.
+        with monkeypatch.context() as failing:
+            failing.setattr("voxtile.dask.remapping.join_remap", lambda *_, **__: (_ for _ in ()).throw(OSError("x")))
+            with pytest.raises(OSError, match="x"):
+                voxtile_dask.remap(tmp_path / "map", poses, **options)
+        seen: list[tuple[int, int]] = []
+        report = voxtile_dask.remap(tmp_path / "map", poses, **options, progress=lambda *done: seen.append(done))
+        wanted = voxtile.remap(tmp_path / "one", poses)
+        assert report["scans_changed"] == wanted["scans_changed"] == len(moved)
+        assert report["parts_done_before"] == report["parts"] > 0 and not seen
+        for digest in voxtile.digest, voxtile.scan_digest:
+            assert digest(tmp_path / "map") == digest(tmp_path / "one")
+    assert voxtile.verify(tmp_path / "map")["findings"] == []
+    assert not (tmp_path / "map.remap.parts").exists()
+    # Some poses; the others follow.
+    some = {1: poses[0], 12: poses[11] @ np.diag([1.0, 1.0, 1.0, 1.0])}
+    some[12][1, 3] += 1.0
+    voxtile_dask.remap(tmp_path / "map", some, interpolate=True, keep_as="before", **options)
+    voxtile.remap(tmp_path / "one", some, interpolate=True)
+    assert voxtile.scan_digest(tmp_path / "map") == voxtile.scan_digest(tmp_path / "one")
+    assert voxtile.digest(tmp_path / "map") == voxtile.digest(tmp_path / "one")
+    assert voxtile.digest(tmp_path / "map", snapshot="before") != voxtile.digest(tmp_path / "map")
+
+
 def test_the_tile_size_follows_the_resolution(client: object, drive: Path, tmp_path: Path) -> None:
     options = {"resolution": 0.15, "max_range": 4.0}
     voxtile.build(drive, tmp_path / "whole", **options)

@@ -80,7 +80,7 @@ impl KeptScan {
     #[must_use]
     pub fn with_pose(mut self, world_from_sensor: Pose) -> Self {
         self.world_from_sensor = Some(world_from_sensor);
-        self.record.frame = KeptFrame::Sensor(pose_numbers(&world_from_sensor));
+        self.record.frame = frame_of(&world_from_sensor);
         self
     }
 
@@ -196,6 +196,11 @@ pub(crate) fn pose_numbers(pose: &Pose) -> [f64; 7] {
 }
 
 /// Returns the pose of a [`KeptFrame::Sensor`], bit for bit, without normalising the quaternion again.
+/// The frame of points of a sensor with a pose.
+pub(crate) fn frame_of(world_from_sensor: &Pose) -> KeptFrame {
+    KeptFrame::Sensor(pose_numbers(world_from_sensor))
+}
+
 pub(super) fn pose_of_numbers(&[x, y, z, qx, qy, qz, qw]: &[f64; 7]) -> Pose {
     let rotation = UnitQuaternion::new_unchecked(Quaternion::new(qw, qx, qy, qz));
     Pose::from(Isometry3::from_parts(Translation3::new(x, y, z), rotation))

@@ -443,7 +443,7 @@ impl OutOfCoreTileMapper {
     }
 
     /// Replays a kept scan within the selected tiles, or all; also returns the tiles that it changed.
-    pub(super) fn replay_scan(
+    pub(crate) fn replay_scan(
         &mut self,
         number: u64,
         scan: &dyn ScanPoints,
@@ -471,7 +471,7 @@ impl OutOfCoreTileMapper {
     }
 
     /// Commits a replay; the number of scans does not change.
-    pub(super) fn commit_replay(&mut self, scan_number: u64, have_poses_changed: bool) -> Result<()> {
+    pub(crate) fn commit_replay(&mut self, scan_number: u64, have_poses_changed: bool) -> Result<()> {
         let mut pager = self.pager();
         if have_poses_changed {
             pager.forget_poses_of_inputs();

@@ -62,6 +62,11 @@ impl Remapper {
         self.mapper.write_marks(marks)
     }
 
+    /// Adds the tiles of a shard of this map, which remains.
+    pub(crate) fn link_in(&mut self, shard: &TileStore) -> Result<()> {
+        self.mapper.with_store(|store| store.link_in(shard))
+    }
+
     /// Swaps in the committed content of a shadow map: its tiles, and its entries as the new catalog.
     pub(crate) fn take_over(&mut self, side: &mut ShadowMapper) -> Result<()> {
         self.mapper.with_store(|store| {

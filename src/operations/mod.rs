@@ -58,8 +58,9 @@ pub use merge::{Merged, merge};
 pub use merge_rule::Prefer;
 pub use part::{AreaPart, Part};
 pub use remapping::{
-    NewPoses, OnlineRemap, PointsRemoved, Rebuilt, Remap, Remapped, Replay, Replayed, ScanSelection,
-    ScansRemoved, ScansWithout, SnapshotFailure, mark_moving, rebuild, remap, remove_points, remove_scans,
+    NewPoses, OnlineRemap, PointsRemoved, Rebuilt, Remap, RemapPart, Remapped, Replay, Replayed,
+    ScanSelection, ScansRemoved, ScansWithout, SnapshotFailure, join_remap, mark_moving, rebuild, remap,
+    remap_columns, remap_part, remove_points, remove_scans,
 };
 pub use replace_tiles::{TilesReplaced, replace_tiles};
 pub use revert::{Reverted, revert};

@@ -71,6 +71,17 @@ impl TileBox {
         self.max.into()
     }
 
+    /// A column of all tiles of a square: `tiles` along x and y, from `column` times as many on. Saturates at the limits
+    /// of indices.
+    pub fn of_column(column: [i32; 2], tiles: u32) -> Self {
+        let first = |k: usize, shift: i64| {
+            let edge = i64::from(tiles.max(1));
+            let at = i64::from(column[k]) * edge + shift * (edge - 1);
+            at.clamp(i64::from(i32::MIN), i64::from(i32::MAX)) as i32
+        };
+        Self { min: [first(0, 0), first(1, 0), i32::MIN], max: [first(0, 1), first(1, 1), i32::MAX] }
+    }
+
     /// The smallest box around both.
     pub fn union(self, other: Self) -> Self {
         Self {

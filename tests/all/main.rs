@@ -70,6 +70,8 @@ mod remap_reads;
 mod remapping;
 mod remapping_beside;
 mod remapping_changed;
+/// Remaps that several processes share, compared with one.
+mod remapping_in_parts;
 /// The list of scans of a map.
 mod scan_list;
 /// Scan streams in files and from standard input.

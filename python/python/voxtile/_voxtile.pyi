@@ -40,11 +40,14 @@ __all__ = [
     "import_octree",
     "join",
     "join_parts",
+    "join_remap",
     "merge",
     "move_shard",
     "open_scans",
     "remap",
     "remap_as",
+    "remap_columns",
+    "remap_part",
     "remove_points",
     "remove_scans",
     "scan_digest",
@@ -365,6 +368,35 @@ def remap(
     interpolate: bool = False,
     memory: int | str | None = None,
     progress: _Progress | None = None,
+) -> dict[str, Any]: ...
+def remap_columns(
+    map: _Path,
+    poses: Mapping[int, _Pose] | Iterable[_Pose],
+    tiles: int,
+    *,
+    interpolate: bool = False,
+    tolerance: tuple[float, float] | None = None,
+) -> list[tuple[int, int]]: ...
+def remap_part(
+    map: _Path,
+    poses: Mapping[int, _Pose] | Iterable[_Pose],
+    column: tuple[int, int],
+    tiles: int,
+    output: _Path,
+    *,
+    interpolate: bool = False,
+    tolerance: tuple[float, float] | None = None,
+    memory: int | str | None = None,
+) -> str: ...
+def join_remap(
+    map: _Path,
+    poses: Mapping[int, _Pose] | Iterable[_Pose],
+    parts: Sequence[tuple[_Path | None, str]],
+    *,
+    interpolate: bool = False,
+    tolerance: tuple[float, float] | None = None,
+    keep_as: str | None = None,
+    memory: int | str | None = None,
 ) -> dict[str, Any]: ...
 def class_style(number: int, /) -> tuple[str, tuple[int, int, int]]: ...
 def clean(

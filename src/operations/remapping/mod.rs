@@ -2,6 +2,7 @@
 //!
 //! ```text
 //! change of scans -> revision: affected tiles -> replay of all scans in these tiles, in order -> one commit
+//! new poses -> remap_columns -> remap_part by several processes, each into a shard -> join_remap: one commit
 //! ```
 //!
 //! Afterwards the map equals, bit by bit, a map built from the changed scans: the content of a tile depends only on the
@@ -14,6 +15,7 @@ mod new_poses;
 mod online_remap;
 mod rebuild;
 mod remap;
+mod remap_in_parts;
 mod remove_points;
 mod remove_scans;
 mod replay;
@@ -25,6 +27,7 @@ pub use new_poses::NewPoses;
 pub use online_remap::OnlineRemap;
 pub use rebuild::{Rebuilt, ScansWithout, rebuild};
 pub use remap::{Remap, Remapped, remap};
+pub use remap_in_parts::{RemapPart, join_remap, remap_columns, remap_part};
 pub use remove_points::{PointsRemoved, remove_points};
 pub use remove_scans::{ScanSelection, ScansRemoved, SnapshotFailure, remove_scans};
 pub use replay::{Replay, Replayed};

@@ -130,7 +130,7 @@ pub(super) fn replay(
 }
 
 /// Opens the map for writing, as of the flush of the summary.
-fn open(scans: &KeptSummary) -> Result<TileStore> {
+pub(super) fn open(scans: &KeptSummary) -> Result<TileStore> {
     let (disk, folder) = scans.place();
     let store = TileStore::open(disk, folder)?;
     match store.commits().flush_number == scans.flush_number() {

@@ -25,14 +25,46 @@ impl TileStore {
         tiles.into_iter().try_for_each(|tile| self.swap_in_tile(other, tile))
     }
 
+    /// Like [`TileStore::swap_in`], but `other` keeps its files: they get hard links, or are copied without these.
+    ///
+    /// # Errors
+    ///
+    /// As for [`TileStore::swap_in`], and a file that differs from the log of `other`.
+    pub fn link_in(&mut self, other: &Self) -> Result<()> {
+        self.finish_earlier_work()?;
+        let mut tiles: Vec<_> = other.tiles().iter().collect();
+        tiles.sort_unstable();
+        for tile in tiles {
+            let version = other.version_to_copy(tile)?;
+            self.check_is_own(tile)?;
+            make_folder(&**self.disk(), &self.layout().tile_folder(tile))?;
+            for &file in self.layout().files() {
+                other.check_length(tile, file)?;
+                let (from, to) = (other.layout().current(tile, file), self.layout().next(tile, file));
+                if self.disk().link(&from, &to).is_err() {
+                    other.copy_file(&self.writer()?, tile, file)?;
+                }
+            }
+            self.versions.note_next(tile, version);
+        }
+        Ok(())
+    }
+
+    /// Checks that no foreign folder has the name of a tile.
+    fn check_is_own(&self, tile: TileIndex) -> Result<()> {
+        match self.versions.is_orphan(tile) {
+            true => {
+                let hint = "it is not part of the map; `voxtile repair` moves it to quarantine";
+                Err(Error::AlreadyExists { path: self.layout().tile_folder(tile), hint })
+            }
+            false => Ok(()),
+        }
+    }
+
     fn swap_in_tile(&mut self, other: &Self, tile: TileIndex) -> Result<()> {
         let Some(version) = other.tiles().version(tile) else { return Ok(()) };
-        let folder = self.layout().tile_folder(tile);
-        if self.versions.is_orphan(tile) {
-            let hint = "it is not part of the map; `voxtile repair` moves it to quarantine";
-            return Err(Error::AlreadyExists { path: folder, hint });
-        }
-        make_folder(&**self.disk(), &folder)?;
+        self.check_is_own(tile)?;
+        make_folder(&**self.disk(), &self.layout().tile_folder(tile))?;
         for &file in self.layout().files() {
             let (from, to) = (other.layout().current(tile, file), self.layout().next(tile, file));
             self.disk().rename(&from, &to).map_err(|error| Error::io(&from, "rename", error))?;

@@ -7,6 +7,7 @@ from .building import BuildOptions, build
 from .columns import decay, merge, verify
 from .comparing import CompareOptions, compare
 from .jobs import export, statistics
+from .remapping import remap
 from .tiles import Tile, map_tiles
 
 __all__ = [
@@ -19,6 +20,7 @@ __all__ = [
     "export",
     "map_tiles",
     "merge",
+    "remap",
     "statistics",
     "verify",
 ]
