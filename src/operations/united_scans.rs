@@ -74,7 +74,7 @@ impl<'a> Part<'a> {
         Self::new(Source::Open(map), map)
     }
 
-    /// A shard that nobody changes; `map` is its reader.
+    /// A shard without a writer; `map` is its reader.
     pub(super) fn of_shard(path: &'a MapPath, map: &MapReader) -> Self {
         Self::new(Source::Shard(path), map)
     }

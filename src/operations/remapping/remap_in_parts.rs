@@ -292,7 +292,7 @@ fn limited_to(region: TileBox, record: &KeptRecord) -> Option<crate::config::Ray
 /// A box around the tiles that a scan can change with a new pose: its rays are as long as before.
 fn reach_of(record: &KeptRecord, pose: &Pose, grid: &Grid) -> Result<TileBox> {
     let longest_m = match record.rays.region {
-        // The tiles of a region do not say how long the rays are.
+        // Rays may end beyond the tiles of a region.
         Some(_) => record.rays.max_range_m.ok_or_else(|| {
             let reason = format!("scan {} was mapped into a region, without a maximum range", record.number);
             Error::argument("map", reason)
