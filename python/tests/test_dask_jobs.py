@@ -240,7 +240,7 @@ def test_comparisons_by_many_workers_are_those_of_one(
     assert (400, 400) in seen
     with pytest.raises(errors.ArgumentError, match="parts"):
         voxtile_dask.compare(before, after, parts=0, client=client)
-    with pytest.raises(errors.ArgumentError, match="tolerence"):
-        voxtile_dask.compare(before, after, client=client, tolerence=1.0)
+    with pytest.raises(errors.ArgumentError, match="distance"):
+        voxtile_dask.compare(before, after, client=client, distance=1.0)
     with pytest.raises(errors.NoMapError):
         voxtile_dask.compare(before, tmp_path / "missing", client=client)

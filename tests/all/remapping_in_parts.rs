@@ -116,6 +116,16 @@ fn parts_of_another_map_or_state_are_refused() {
     let message = message_of(join_remap(&summary, &poses, &how, &[(Some(foreign), RemapPart::default())]));
     assert!(message.contains("no part of a remap"), "{message}");
     assert_eq!(seen(&disk), whole);
+    // A part is missing, or its text.
+    let at_first = parts.iter().position(|(shard, _)| shard.is_some()).unwrap();
+    let (mut fewer, mut textless) = (parts.clone(), parts.clone());
+    fewer.remove(at_first);
+    textless[at_first].1 = serde_json::to_string(&RemapPart::default()).unwrap();
+    for (given, words) in [(fewer, "pass all parts"), (textless, "no part replaces")] {
+        let message = message_of(join(&disk, &poses, &given, &how));
+        assert!(message.contains(words), "{message}");
+        assert_eq!(seen(&disk), whole);
+    }
     // A flush since the scans were read.
     perform(&disk, &keeping_scans(), &state, &Act::Scans(6..7)).unwrap();
     let first: Vec<_> = parts.iter().map(|_| (None, RemapPart::default())).collect();

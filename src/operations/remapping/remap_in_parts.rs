@@ -3,6 +3,7 @@ use super::new_poses::NewPoses;
 use super::remap::{Remap, Remapped};
 use super::replay::{Replayed, clean_up_after_error, create_snapshot, open};
 use super::revision::{Change, Changes};
+use crate::config::RayConfig;
 use crate::error::{Error, Result};
 use crate::mapper::{KeptScan, KeptSummary, OutOfCoreTileMapper, Remapper, TileFinder, frame_of};
 use crate::scan::Pose;
@@ -135,7 +136,7 @@ pub fn remap_part(
         let updates = report.hits + report.misses;
         part.scans_mapped += 1;
         part.updates_mapped += updates;
-        if pose.is_some() {
+        if pose.is_some() && !tiles.is_empty() {
             let tiles = tiles.into_iter().map(TileIndex::to_array).collect();
             part.moved.push(MovedScan { number, updates, tiles });
         }
@@ -150,8 +151,8 @@ pub fn remap_part(
 ///
 /// # Errors
 ///
-/// As for [`remap`](super::remap()); a shard of another map, or with a tile that its part does not replace. The map is
-/// unchanged then.
+/// As for [`remap`](super::remap()); a missing part; a shard of another map, or with a tile that no part replaces. The
+/// map is unchanged then.
 pub fn join_remap(
     scans: &KeptSummary,
     poses: &NewPoses,
@@ -196,7 +197,9 @@ fn joined(
     }
     let replaced: Vec<TileIndex> =
         parts.iter().flat_map(|(_, part)| &part.replaced).copied().map(TileIndex::from).collect();
-    let replaced = replaced.into_iter().filter(|tile| store.tiles().contains(*tile)).collect::<Vec<_>>();
+    let replaced: FxHashSet<TileIndex> =
+        replaced.into_iter().filter(|tile| store.tiles().contains(*tile)).collect();
+    let kept: FxHashSet<TileIndex> = store.tiles().iter().filter(|tile| !replaced.contains(tile)).collect();
     let config = how.replay.config_of(&store)?;
     let (map_id, mut records) = (store.map_id(), store.archive().records()?);
     let mut remapper = Remapper::begin(store, config, replaced, how.replay.stop.clone())?;
@@ -207,6 +210,11 @@ fn joined(
             continue;
         };
         if let Some(Change::Move(pose)) = changes.get(&record.number) {
+            if let Some(tile) = record.tiles.iter().find(|tile| kept.contains(tile)) {
+                let reason =
+                    format!("no part replaces {tile}, which scan {} touched: pass all parts", record.number);
+                return Err(Error::argument("parts", reason));
+            }
             record.frame = frame_of(pose);
             (record.updates, record.tiles) = moved.remove(&record.number).unwrap_or_default();
             record.tiles.sort_unstable();
@@ -219,6 +227,10 @@ fn joined(
         let shard = TileStore::open_read_only(disk, &folder)?;
         if shard.map_id() != map_id {
             return Err(Error::argument(folder.display().to_string(), "is no part of a remap of this map"));
+        }
+        if let Some(tile) = shard.tiles().iter().find(|tile| kept.contains(tile)) {
+            let reason = format!("has {tile}, which no part replaces: pass the text of this part");
+            return Err(Error::argument(folder.display().to_string(), reason));
         }
         remapper.link_in(&shard)?;
     }
@@ -283,10 +295,10 @@ fn tiles_of_moved(
 }
 
 /// The ray settings of a scan for a region; `None` if it was never mapped there.
-fn limited_to(region: TileBox, record: &KeptRecord) -> Option<crate::config::RayConfig> {
+fn limited_to(region: TileBox, record: &KeptRecord) -> Option<RayConfig> {
     let own = record.rays.region;
     let region = own.map_or(Some(region), |own| own.intersection(region))?;
-    Some(crate::config::RayConfig { region: Some(region), ..record.rays })
+    Some(RayConfig { region: Some(region), ..record.rays })
 }
 
 /// A box around the tiles that a scan can change with a new pose: its rays are as long as before.
