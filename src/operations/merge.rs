@@ -45,8 +45,8 @@ pub struct Merged {
 ///
 /// The new map has its own id. If the maps are regions of one build ([`RayConfig::region`](crate::RayConfig)) that
 /// together form a box, the result equals one build of that box and can be resumed. If all maps keep their scans, the
-/// new map keeps those of regions, or of unrelated maps one after the other if their evidence is added or they have no
-/// common tile; else it has no scans. The maps must have the same layers, which are combined like the evidence: added,
+/// new map keeps those of regions, or of unrelated maps of all of space one after the other if their evidence is added or
+/// they have no common tile; else it has no scans. The maps must have the same layers, which are combined like the evidence: added,
 /// or those of the preferred map. The map is created on the disk of the first map, and appears only when it is complete,
 /// see [`MapWriter`]. `progress` receives the number of tiles done and in total.
 ///
@@ -75,9 +75,9 @@ pub fn merge(
     let related = related(maps);
     let is_added = matches!(rule, MergeRule::Add { .. });
     let are_all_kept = maps.iter().all(MapReader::keeps_scans);
-    // Otherwise the evidence is not that of all scans.
-    let is_of_all_scans =
-        one_build.is_some() || related.is_empty() && (is_added || have_no_common_tile(maps));
+    // Regions of different builds have common scans. Without a sum of evidence, it is not that of all scans.
+    let are_apart = related.is_empty() && maps.iter().all(|map| map.config().rays.region.is_none());
+    let is_of_all_scans = one_build.is_some() || are_apart && (is_added || have_no_common_tile(maps));
     let keeps_scans = are_all_kept && is_of_all_scans;
     match one_build {
         Some(build) if keeps_scans => {

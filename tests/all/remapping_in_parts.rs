@@ -112,8 +112,10 @@ fn parts_of_another_map_or_state_are_refused() {
     let whole = seen(&disk);
     // A part of another map.
     let foreign = MapPath::on(disk.shared(), "/parts/foreign");
-    voxtile::OutOfCoreTileMapper::create(foreign.clone(), config()).unwrap();
-    let message = message_of(join_remap(&summary, &poses, &how, &[(Some(foreign), RemapPart::default())]));
+    voxtile::OutOfCoreTileMapper::create(foreign, config()).unwrap();
+    let mut with_foreign = parts.clone();
+    with_foreign.push((Some("/parts/foreign".into()), serde_json::to_string(&RemapPart::default()).unwrap()));
+    let message = message_of(join(&disk, &poses, &with_foreign, &how));
     assert!(message.contains("no part of a remap"), "{message}");
     assert_eq!(seen(&disk), whole);
     // A part is missing, or its text.

@@ -37,7 +37,8 @@ for program in voxtile voxtile-share voxtile-ros2; do
 done
 
 # Runs without the repository, cargo and the libraries of this machine: in a chroot if permitted.
-run() { env --ignore-environment PATH="$place/bin" QEMU_LD_PREFIX="${QEMU_LD_PREFIX:-}" "${emulator[@]}" "bin/$1" "${@:2}"; }
+# The node starts itself again to set MALLOC_ARENA_MAX, which the emulator alone cannot do.
+run() { env --ignore-environment PATH="$place/bin" MALLOC_ARENA_MAX=1 QEMU_LD_PREFIX="${QEMU_LD_PREFIX:-}" "${emulator[@]}" "bin/$1" "${@:2}"; }
 if [[ ${#emulator[@]} -eq 0 && $archive == *-musl.tar.gz ]] && unshare --map-root-user true 2>/dev/null; then
     mkdir --parents tmp
     programs=("$(command -v unshare)" --map-root-user "$(command -v chroot)" "$place")
