@@ -101,9 +101,9 @@ pub fn remap_part(
     let is_touched = |tile: &TileIndex| {
         region.contains(*tile) && touched.as_ref().is_none_or(|touched| touched.contains(tile))
     };
-    let mut part = RemapPart::default();
-    part.replaced = store.tiles().iter().filter(is_touched).map(TileIndex::to_array).collect();
-    part.replaced.sort_unstable();
+    let mut replaced: Vec<_> = store.tiles().iter().filter(is_touched).map(TileIndex::to_array).collect();
+    replaced.sort_unstable();
+    let mut part = RemapPart { replaced, ..RemapPart::default() };
     if touched.as_ref().is_some_and(FxHashSet::is_empty) {
         return Ok(part);
     }
