@@ -7,7 +7,7 @@ import json
 import os
 import re
 import tempfile
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -23,6 +23,8 @@ from .simulation import advised_region_size
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
+    _Pose = ArrayLike | tuple[ArrayLike, ArrayLike]
+
 _Path = str | os.PathLike[str]
 
 # The type hints of `distributed` are incomplete.
@@ -34,7 +36,7 @@ _OWN_NAMES = re.compile(r"attempt-[0-9a-f]{32}(\.unfinished)?|[0-9a-f]{16}-(-?[0
 
 def remap(
     map: _Path,
-    poses: ArrayLike | Mapping[int, ArrayLike],
+    poses: Mapping[int, _Pose] | Iterable[_Pose],
     *,
     interpolate: bool = False,
     tolerance: tuple[float, float] | None = None,
@@ -63,18 +65,20 @@ def remap(
     how: dict[str, Any] = {"interpolate": interpolate, "tolerance": tolerance}
     found: Any = _dask.Client.current() if client is None else client
     parts = path.with_name(f"{path.name}.remap.parts")
+    if not isinstance(poses, Mapping):
+        poses = list(poses)
     with locked(parts, _OWN_NAMES):
         columns = remap_columns(str(path), poses, tiles, **how)
         state = (described["map_id"], described["flush_number"], tiles, _digest(poses), interpolate, tolerance)
         mark = hashlib.sha256(json.dumps([version("voxtile"), *state]).encode()).hexdigest()[:16]
         names = [parts / f"{mark}-{x}-{y}" for x, y in columns]
         unfinished = [number for number, name in enumerate(names) if _read(name) is None]
-        sent = found.scatter(poses if isinstance(poses, Mapping) else [poses], broadcast=True) if unfinished else None
+        sent: Any = found.scatter([poses], broadcast=True)[0] if unfinished else None
         futures = [
             found.submit(
                 _remap_part,
                 str(path),
-                sent if isinstance(poses, Mapping) else sent[0],
+                sent,
                 columns[number],
                 tiles,
                 str(names[number]),
