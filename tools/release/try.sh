@@ -19,6 +19,8 @@ if [[ $cpu != $(uname -m) ]]; then
         exit 0
     }
     export QEMU_LD_PREFIX=${QEMU_LD_PREFIX:-/usr/$cpu-linux-gnu}
+    # Without it the programs start themselves again to set it, which the emulator alone cannot do.
+    export MALLOC_ARENA_MAX=1
     if [[ $archive != *-musl.tar.gz ]] && ! compgen -G "$QEMU_LD_PREFIX/lib/ld-linux-*" >/dev/null; then
         echo "release: $archive: not tried; QEMU_LD_PREFIX names no folder with glibc for $cpu"
         exit 0
@@ -37,8 +39,7 @@ for program in voxtile voxtile-share voxtile-ros2; do
 done
 
 # Runs without the repository, cargo and the libraries of this machine: in a chroot if permitted.
-# The node starts itself again to set MALLOC_ARENA_MAX, which the emulator alone cannot do.
-run() { env --ignore-environment PATH="$place/bin" MALLOC_ARENA_MAX=1 QEMU_LD_PREFIX="${QEMU_LD_PREFIX:-}" "${emulator[@]}" "bin/$1" "${@:2}"; }
+run() { env --ignore-environment PATH="$place/bin" MALLOC_ARENA_MAX="${MALLOC_ARENA_MAX:-1}" QEMU_LD_PREFIX="${QEMU_LD_PREFIX:-}" "${emulator[@]}" "bin/$1" "${@:2}"; }
 if [[ ${#emulator[@]} -eq 0 && $archive == *-musl.tar.gz ]] && unshare --map-root-user true 2>/dev/null; then
     mkdir --parents tmp
     programs=("$(command -v unshare)" --map-root-user "$(command -v chroot)" "$place")
