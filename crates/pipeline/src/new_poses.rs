@@ -121,7 +121,7 @@ fn poses_of_some(
         if trajectory.len() != wanted {
             let (poses, all) = (trajectory.len(), scans.len());
             return Err(wrong(format!(
-                "{poses} poses, but every {step}th of {all} kept scans are {wanted}; give another step, or poses with \
+                "{poses} poses, but {all} kept scans in steps of {step} need {wanted}; give another step, or poses with \
                  time stamps"
             )));
         }

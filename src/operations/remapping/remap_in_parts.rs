@@ -2,7 +2,7 @@ use super::completion::release;
 use super::new_poses::NewPoses;
 use super::remap::{Remap, Remapped};
 use super::replay::{Replayed, clean_up_after_error, create_snapshot, open};
-use super::revision::{Change, Changes};
+use super::revision::{Change, Changes, MAX_POINTS_IN_MEMORY, PART_FOR_ALL};
 use crate::config::RayConfig;
 use crate::error::{Error, Result};
 use crate::mapper::{KeptScan, KeptSummary, OutOfCoreTileMapper, Remapper, TileFinder, frame_of};
@@ -32,10 +32,6 @@ struct MovedScan {
     tiles: Vec<[i32; 3]>,
 }
 
-/// If more than one third of all updates belong to moved scans, all tiles are replayed, see
-/// [`remap`](super::remap()).
-const PART_FOR_ALL: u64 = 3;
-const MAX_POINTS_IN_MEMORY: u64 = 1 << 18;
 /// More columns than any plan has: a few rays of many kilometres.
 const MAX_COLUMNS: u64 = 1 << 20;
 

@@ -60,9 +60,9 @@ impl MarkSource {
 
 /// If more than one third of all updates belong to changed scans, all tiles are replayed: finding the affected tiles
 /// would cost more than it saves.
-const PART_FOR_ALL: u64 = 3;
+pub(super) const PART_FOR_ALL: u64 = 3;
 /// Maximum number of points of a kept scan in memory. Larger scans are read again when needed.
-const MAX_POINTS_IN_MEMORY: u64 = 1 << 18;
+pub(super) const MAX_POINTS_IN_MEMORY: u64 = 1 << 18;
 
 /// Change of scans, and its effects.
 pub(super) struct Revision {

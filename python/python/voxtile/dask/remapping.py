@@ -141,12 +141,12 @@ def _remap_part(
         if os.path.exists(made):
             move_to_place(made, name, map_id)
     # The text makes the part complete, so it comes last.
-    beside = f"{name}.new"
-    with open(beside, "w", encoding="utf-8") as file:
+    unfinished = f"{name}.new"
+    with open(unfinished, "w", encoding="utf-8") as file:
         file.write(text)
         file.flush()
         os.fsync(file.fileno())
-    os.replace(beside, f"{name}.json")
+    os.replace(unfinished, f"{name}.json")
 
 
 def _check_shard(name: str) -> None:
