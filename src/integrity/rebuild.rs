@@ -412,6 +412,7 @@ fn identity(layout: &Layout, remains: &Salvage, trailers: &Trailers) -> Result<(
         layers: parameters.layers,
         crs: None,
         keeps_scans: false,
+        keeps_motion: false,
         catalog: None,
         scan_records: None,
         snapshots: None,

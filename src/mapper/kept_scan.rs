@@ -2,7 +2,8 @@ use crate::config::RayConfig;
 use crate::error::Result;
 use crate::persistence::{PointReader, read_marks};
 use crate::scan::{
-    AttributeSet, MovingMarks, PointAttributes, PointFrame, Pose, ScanPoints, TakeAttributed, TakePoints,
+    AttributeSet, MovingMarks, PointAttributes, PointFrame, Pose, ScanPoints, Sweep, TakeAttributed,
+    TakePoints,
 };
 use crate::space::Point;
 use crate::store::{Disk, KeptFrame, KeptRecord, Layout};
@@ -19,6 +20,32 @@ pub struct KeptScan {
     world_from_sensor: Option<Pose>,
     points: Points,
     moving: Option<Arc<MovingMarks>>,
+}
+
+/// New pose of a scan.
+#[derive(Clone, Debug)]
+pub struct NewPose {
+    /// Pose of the sensor at the stamp of the scan.
+    pub world_from_sensor: Pose,
+    /// Motion of the sensor during the scan; `None` to keep the motion that it has.
+    pub sweep: Option<Arc<Sweep>>,
+}
+
+impl NewPose {
+    /// Changes the record of a scan.
+    pub(crate) fn put_in(&self, record: &mut KeptRecord) {
+        record.frame = KeptFrame::Sensor(pose_numbers(&self.world_from_sensor));
+        // Without times of points, a motion has no meaning.
+        if record.sweep.is_some() && self.sweep.is_some() {
+            record.sweep.clone_from(&self.sweep);
+        }
+    }
+}
+
+impl From<Pose> for NewPose {
+    fn from(world_from_sensor: Pose) -> Self {
+        Self { world_from_sensor, sweep: None }
+    }
 }
 
 #[derive(Clone, Debug)]
@@ -50,7 +77,7 @@ impl KeptScan {
         if scan.record.points <= max_points {
             let (mut points, mut intensities, mut all) = (Vec::new(), Vec::new(), PointAttributes::default());
             let range = 0..scan.len();
-            scan.for_each_attributed_chunk(range, PointFrame::Own, &mut |some, of_some, attributes| {
+            scan.for_each_block(range, &mut |some, of_some, attributes| {
                 points.extend_from_slice(some);
                 intensities.extend_from_slice(of_some.unwrap_or_default());
                 all.extend(attributes);
@@ -76,11 +103,12 @@ impl KeptScan {
         &self.record
     }
 
-    /// Returns the same scan with another pose.
+    /// Returns the same scan with another pose, and another motion if that has one.
     #[must_use]
-    pub fn with_pose(mut self, world_from_sensor: Pose) -> Self {
-        self.world_from_sensor = Some(world_from_sensor);
-        self.record.frame = frame_of(&world_from_sensor);
+    pub fn with_pose(mut self, new: impl Into<NewPose>) -> Self {
+        let new = new.into();
+        self.world_from_sensor = Some(new.world_from_sensor);
+        new.put_in(&mut self.record);
         self
     }
 
@@ -114,12 +142,8 @@ impl ScanPoints for KeptScan {
     }
 
     fn for_each_chunk(&self, range: Range<usize>, take: &mut TakePoints<'_>) -> Result<()> {
-        let Some(pose) = self.world_from_sensor else { return self.for_each_own_chunk(range, take) };
-        let (to_world, mut in_world) = (pose.to_world(), Vec::new());
-        self.for_each_own_chunk(range, &mut |points, intensities| {
-            in_world.clear();
-            in_world.extend(points.iter().copied().map(to_world));
-            take(&in_world, intensities)
+        self.for_each_attributed_chunk(range, PointFrame::World, &mut |points, intensities, _| {
+            take(points, intensities)
         })
     }
 
@@ -128,11 +152,14 @@ impl ScanPoints for KeptScan {
     }
 
     fn for_each_own_chunk(&self, range: Range<usize>, take: &mut TakePoints<'_>) -> Result<()> {
-        self.for_each_block(range, &mut |points, intensities, _| take(points, intensities))
+        self.for_each_attributed_chunk(range, PointFrame::Own, &mut |points, intensities, _| {
+            take(points, intensities)
+        })
     }
 
     fn attributes(&self) -> AttributeSet {
-        AttributeSet { colours: self.record.has_colours, classes: self.record.has_classes }
+        let KeptRecord { has_colours: colours, has_classes: classes, .. } = self.record;
+        AttributeSet { colours, classes, times: self.record.sweep.is_some() }
     }
 
     fn for_each_attributed_chunk(
@@ -141,15 +168,34 @@ impl ScanPoints for KeptScan {
         frame: PointFrame,
         take: &mut TakeAttributed<'_>,
     ) -> Result<()> {
-        let Some(pose) = self.world_from_sensor.filter(|_| frame == PointFrame::World) else {
+        let to_world =
+            self.world_from_sensor.filter(|_| frame == PointFrame::World).map(|pose| pose.to_world());
+        let sweep = self.sweep().filter(|_| frame != PointFrame::Raw);
+        if to_world.is_none() && sweep.is_none() {
             return self.for_each_block(range, take);
-        };
-        let (to_world, mut in_world) = (pose.to_world(), Vec::new());
+        }
+        let mut moved = Vec::new();
         self.for_each_block(range, &mut |points, intensities, attributes| {
-            in_world.clear();
-            in_world.extend(points.iter().copied().map(to_world));
-            take(&in_world, intensities, attributes)
+            match sweep {
+                Some(sweep) => sweep.move_all(points, attributes.times_ns, &mut moved),
+                None => {
+                    moved.clear();
+                    moved.extend_from_slice(points);
+                }
+            }
+            if let Some(to_world) = &to_world {
+                moved.iter_mut().for_each(|point| *point = to_world(*point));
+            }
+            take(&moved, intensities, attributes)
         })
+    }
+
+    fn sweep(&self) -> Option<&Sweep> {
+        self.record.sweep.as_deref()
+    }
+
+    fn body_from_sensor(&self) -> Option<[f64; 7]> {
+        self.record.body_from_sensor
     }
 }
 
@@ -196,11 +242,6 @@ pub(crate) fn pose_numbers(pose: &Pose) -> [f64; 7] {
 }
 
 /// Returns the pose of a [`KeptFrame::Sensor`], bit for bit, without normalising the quaternion again.
-/// The frame of points of a sensor with a pose.
-pub(crate) fn frame_of(world_from_sensor: &Pose) -> KeptFrame {
-    KeptFrame::Sensor(pose_numbers(world_from_sensor))
-}
-
 pub(super) fn pose_of_numbers(&[x, y, z, qx, qy, qz, qw]: &[f64; 7]) -> Pose {
     let rotation = UnitQuaternion::new_unchecked(Quaternion::new(qw, qx, qy, qz));
     Pose::from(Isometry3::from_parts(Translation3::new(x, y, z), rotation))

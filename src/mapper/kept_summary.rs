@@ -1,8 +1,9 @@
 use super::MapReader;
 use super::kept_scan::pose_of_numbers;
 use crate::error::{Error, Result};
-use crate::scan::Pose;
+use crate::scan::{Pose, Sweep};
 use crate::store::{CatalogEntry, Disk, KeptFrame, KeptRecord, MapPath};
+use rustc_hash::FxHashMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -18,6 +19,8 @@ pub struct KeptSummary {
     /// Generation of the catalog that was read.
     catalog: Option<u64>,
     heads: Vec<KeptScanHead>,
+    /// Motions of the sensor during scans, by their numbers.
+    sweeps: FxHashMap<u64, Arc<Sweep>>,
     /// First and last numbers of removed scans.
     removed: Vec<(u64, u64)>,
     /// Reason why the map cannot be replayed from its scans.
@@ -34,6 +37,9 @@ pub struct KeptScanHead {
     pub stamp_ns: Option<i64>,
     /// Sensor pose; `None` if the points are in the world frame, where no pose applies.
     pub world_from_sensor: Option<Pose>,
+    /// Pose of the sensor in the body frame that the trajectory describes, if known: position in metres, then quaternion x,
+    /// y, z, w.
+    pub body_from_sensor: Option<[f64; 7]>,
     /// Number of voxel updates when the scan was inserted; a voxel updated twice counts twice.
     pub updates: u64,
     /// Number of points.
@@ -67,6 +73,7 @@ impl KeptSummary {
             flush_number: map.flush_number(),
             catalog: None,
             heads: Vec::new(),
+            sweeps: FxHashMap::default(),
             removed: Vec::new(),
             refusal: None,
         };
@@ -80,6 +87,9 @@ impl KeptSummary {
             match &entry {
                 CatalogEntry::Kept(record) => {
                     each(record)?;
+                    if let Some(sweep) = &record.sweep {
+                        summary.sweeps.insert(record.number, sweep.clone());
+                    }
                     summary.heads.push(KeptScanHead::of(record));
                 }
                 CatalogEntry::Removed(first, last) => summary.removed.push((*first, *last)),
@@ -124,6 +134,11 @@ impl KeptSummary {
         &self.heads
     }
 
+    /// Motion of the sensor during a scan, if its points have times.
+    pub fn sweep(&self, number: u64) -> Option<&Sweep> {
+        self.sweeps.get(&number).map(|sweep| &**sweep)
+    }
+
     /// First and last number of each range of removed scans, in order.
     pub fn removed(&self) -> &[(u64, u64)] {
         &self.removed
@@ -157,7 +172,17 @@ impl KeptScanHead {
         let moving_points = moving.map_or(0, |marks| marks.marked);
         let segments = [place.segment, of_marks];
         let has_lost_marks = record.has_lost_marks();
-        Self { number, stamp_ns, world_from_sensor, updates, points, moving_points, has_lost_marks, segments }
+        Self {
+            number,
+            stamp_ns,
+            world_from_sensor,
+            body_from_sensor: record.body_from_sensor,
+            updates,
+            points,
+            moving_points,
+            has_lost_marks,
+            segments,
+        }
     }
 
     /// Creates a summary of a scan, for tests.
@@ -167,6 +192,7 @@ impl KeptScanHead {
             number,
             stamp_ns,
             world_from_sensor,
+            body_from_sensor: None,
             updates: 0,
             points: 0,
             moving_points: 0,

@@ -35,8 +35,7 @@ mod trace_rules;
 mod traits;
 
 pub use in_memory::InMemoryMapper;
-pub use kept_scan::KeptScan;
-pub(crate) use kept_scan::frame_of;
+pub use kept_scan::{KeptScan, NewPose};
 pub use kept_scans::KeptScans;
 pub(crate) use kept_summary::no_kept_scan;
 pub use kept_summary::{KeptScanHead, KeptSummary};

@@ -15,7 +15,7 @@ use crate::store::{
     SnapshotName, TileStore,
 };
 use std::path::Path;
-use std::sync::OnceLock;
+use std::sync::{Arc, OnceLock};
 
 /// Map on disk with its active tiles in memory. Its size is limited by the disk, not by memory.
 ///
@@ -605,6 +605,8 @@ fn kept_record(
         updates: report.hits + report.misses,
         place,
         moving,
+        sweep: scan.sweep().cloned().map(Arc::new),
+        body_from_sensor: scan.body_from_sensor(),
         tiles,
     }
 }

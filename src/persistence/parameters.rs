@@ -21,6 +21,7 @@ pub(crate) fn new_metadata(config: &MapConfig, map_id: [u8; 16], inputs: &[Input
         layers: config.layers(),
         crs: config.crs.clone(),
         keeps_scans: config.keeps_scans,
+        keeps_motion: false,
         catalog: None,
         scan_records: None,
         snapshots: None,

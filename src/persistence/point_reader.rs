@@ -51,6 +51,7 @@ impl PointReader {
     ) -> Result<()> {
         match (intensities > 0) == record.has_intensities
             && (attributes.colours, attributes.classes) == (record.has_colours, record.has_classes)
+            && attributes.times == record.sweep.is_some()
         {
             true => Ok(()),
             false => {

@@ -33,6 +33,7 @@ mod trace;
 mod updates;
 mod world_scan;
 
+pub use crate::sensor::{NO_TIME, Sweep, ToStamp};
 #[doc(hidden)]
 pub use codec::PointBlocks;
 pub(crate) use codec::{MAX_BLOCK_BYTES, PointDecoder, unzigzag, zigzag};

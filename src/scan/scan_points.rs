@@ -1,4 +1,4 @@
-use super::{AttributeSet, AttributeSlices, MovingMarks, Pose, Scan, ScanRef};
+use super::{AttributeSet, AttributeSlices, MovingMarks, Pose, Scan, ScanRef, Sweep};
 use crate::error::Result;
 use crate::space::Point;
 use std::ops::Range;
@@ -18,6 +18,9 @@ pub enum PointFrame {
     World,
     /// The sensor frame if the scan has points in it, else the world frame.
     Own,
+    /// As measured: like [`PointFrame::Own`], but each point in the sensor frame at its own time, if the scan has a
+    /// [`Sweep`]. Times are among the attributes.
+    Raw,
 }
 
 /// Points of a scan, in memory or in a file that may exceed memory, and the position of the sensor.
@@ -64,6 +67,18 @@ pub trait ScanPoints: Sync {
         self.for_each_chunk(range, take)
     }
 
+    /// Motion of the sensor during the scan, if its points have times. All but [`PointFrame::Raw`] points are already
+    /// moved to the frame at the stamp.
+    fn sweep(&self) -> Option<&Sweep> {
+        None
+    }
+
+    /// Pose of the sensor in the body frame that the trajectory describes, if it is known and another frame: position in
+    /// metres, then quaternion x, y, z, w.
+    fn body_from_sensor(&self) -> Option<[f64; 7]> {
+        None
+    }
+
     /// Marks of the points that hit something that was moving; `None` if there are none. Such a point is no hit, but its
     /// ray passes free voxels.
     fn moving(&self) -> Option<&MovingMarks> {
@@ -105,7 +120,7 @@ pub trait ScanPoints: Sync {
     ) -> Result<()> {
         match frame {
             PointFrame::World => self.for_each_chunk(range, take),
-            PointFrame::Own => self.for_each_own_chunk(range, take),
+            PointFrame::Own | PointFrame::Raw => self.for_each_own_chunk(range, take),
         }
     }
 

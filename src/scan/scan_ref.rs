@@ -2,7 +2,8 @@ use super::coordinate::Coordinate;
 use super::coordinate::sealed::PointSlice;
 use super::trace::check_count;
 use super::{
-    AttributeSet, MovingMarks, PointAttributes, PointFrame, Pose, ScanPoints, TakeAttributed, TakePoints,
+    AttributeSet, MovingMarks, PointAttributes, PointFrame, Pose, ScanPoints, Sweep, TakeAttributed,
+    TakePoints,
 };
 use crate::error::{Error, Result};
 use crate::space::Point;
@@ -41,6 +42,7 @@ pub struct ScanRef<'a> {
     intensities: Option<&'a [f32]>,
     attributes: Option<&'a PointAttributes>,
     moving: Option<&'a MovingMarks>,
+    sweep: Option<&'a Sweep>,
     stamp_ns: Option<i64>,
 }
 
@@ -69,7 +71,7 @@ impl<'a> ScanRef<'a> {
     }
 
     fn new(frame: Frame, points: PointSlice<'a>) -> Self {
-        Self { frame, points, intensities: None, attributes: None, moving: None, stamp_ns: None }
+        Self { frame, points, intensities: None, attributes: None, moving: None, sweep: None, stamp_ns: None }
     }
 
     /// Adds an intensity per point.
@@ -103,6 +105,23 @@ impl<'a> ScanRef<'a> {
             return Err(Error::argument("moving", reason));
         }
         Ok(Self { moving: Some(moving), ..self })
+    }
+
+    /// Adds the motion of the sensor during the scan: points are in the sensor frame at their own times, which are among
+    /// the attributes, and are moved to the sensor frame at the stamp when they are mapped (deskewing).
+    ///
+    /// # Errors
+    ///
+    /// Points in the world frame, or without times.
+    pub fn with_sweep(self, sweep: &'a Sweep) -> Result<Self> {
+        let reason = match (self.frame, self.attributes.is_some_and(|attributes| attributes.set().times)) {
+            (Frame::World(_), _) => "points in the world frame are already motion-compensated",
+            (Frame::Sensor(_), false) if !self.is_empty() => {
+                "the points have no times; add them as attributes"
+            }
+            _ => return Ok(Self { sweep: Some(sweep), ..self }),
+        };
+        Err(Error::argument("sweep", reason))
     }
 
     /// Adds the acquisition time, in nanoseconds since the epoch of its source.
@@ -150,15 +169,35 @@ impl ScanPoints for ScanRef<'_> {
         take: &mut TakeAttributed<'_>,
     ) -> Result<()> {
         let mut first = range.start;
-        self.for_each_chunk_in(frame, range, &mut |points, intensities| {
-            let of_chunk = first..first + points.len();
-            first = of_chunk.end;
-            let attributes = self.attributes.map(|attributes| attributes.part(of_chunk));
-            take(points, intensities, attributes.unwrap_or_default())
+        let still = Self { sweep: None, ..*self };
+        let Some(sweep) = self.sweep.filter(|_| frame != PointFrame::Raw) else {
+            return still.for_each_chunk_in(frame, range, &mut |points, intensities| {
+                let of_chunk = first..first + points.len();
+                first = of_chunk.end;
+                let attributes = self.attributes.map(|attributes| attributes.part(of_chunk));
+                take(points, intensities, attributes.unwrap_or_default())
+            });
+        };
+        let to_world =
+            self.world_from_sensor().filter(|_| frame == PointFrame::World).map(|pose| pose.to_world());
+        let mut moved = Vec::new();
+        still.for_each_attributed_chunk(range, PointFrame::Raw, &mut |points, intensities, attributes| {
+            sweep.move_all(points, attributes.times_ns, &mut moved);
+            if let Some(to_world) = &to_world {
+                moved.iter_mut().for_each(|point| *point = to_world(*point));
+            }
+            take(&moved, intensities, attributes)
         })
     }
 
     fn for_each_chunk(&self, range: Range<usize>, take: &mut TakePoints<'_>) -> Result<()> {
+        if self.sweep.is_some() {
+            return self.for_each_attributed_chunk(
+                range,
+                PointFrame::World,
+                &mut |points, intensities, _| take(points, intensities),
+            );
+        }
         let intensities = self.intensities.map(|all| part(all, &range)).transpose()?;
         match (self.points, &self.frame) {
             (PointSlice::F64(points), Frame::World(_)) => {
@@ -185,7 +224,16 @@ impl ScanPoints for ScanRef<'_> {
         }
     }
 
+    fn sweep(&self) -> Option<&Sweep> {
+        self.sweep
+    }
+
     fn for_each_own_chunk(&self, range: Range<usize>, take: &mut TakePoints<'_>) -> Result<()> {
+        if self.sweep.is_some() {
+            return self.for_each_attributed_chunk(range, PointFrame::Own, &mut |points, intensities, _| {
+                take(points, intensities)
+            });
+        }
         let intensities = self.intensities.map(|all| part(all, &range)).transpose()?;
         match self.points {
             PointSlice::F64(points) => {

@@ -1,4 +1,5 @@
-//! Sensor models: the change of a voxel's evidence by one observation, independent of space.
+//! Sensor models: the change of a voxel's evidence by one observation, independent of space; and the motion of a sensor
+//! during a scan (`sweep`).
 //!
 //! | model | for | hit | miss |
 //! |---|---|---|---|
@@ -10,9 +11,11 @@ mod iwlo;
 mod log_odds;
 mod model;
 mod probabilities;
+mod sweep;
 
 pub use evidence::Evidence;
 pub use iwlo::Iwlo;
 pub use log_odds::LogOdds;
 pub use model::{Observation, SensorModel};
 pub use probabilities::Probabilities;
+pub use sweep::{NO_TIME, Sweep, ToStamp};

@@ -232,9 +232,10 @@ impl TileStore {
     ) -> Self {
         let layout = layout.with_storage(metadata.storage());
         let files = MapFiles::new(disk, layout);
-        let keeps_scans = metadata.ext.as_ref().is_some_and(|ext| ext.keeps_scans);
+        let [keeps_scans, has_motion] =
+            metadata.ext.as_ref().map_or([false; 2], |ext| [ext.keeps_scans, ext.keeps_motion]);
         Self {
-            archive: ScanArchive::new(files.clone(), keeps_scans, KeptAsOf::last_of(&commits)),
+            archive: ScanArchive::new(files.clone(), [keeps_scans, has_motion], KeptAsOf::last_of(&commits)),
             files,
             versions: TileVersions::new(commits),
             committer: Committer::new(log, metadata, None),

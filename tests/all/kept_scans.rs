@@ -130,6 +130,8 @@ impl Writer {
             updates: 0,
             place,
             moving: None,
+            sweep: None,
+            body_from_sensor: None,
             tiles: Vec::new(),
         })));
     }

@@ -38,7 +38,7 @@ const LAYERS: [(&str, &[&str]); 19] = [
     ("error.rs", &["space"]),
     ("error", &["space"]),
     ("space", &[]),
-    ("sensor", &["error", "maths"]),
+    ("sensor", &["error", "maths", "space"]),
     ("config.rs", &["error", "maths", "sensor", "space"]),
     ("config", &["error"]),
     ("scan", &["config", "error", "scratch", "sensor", "space"]),

@@ -42,7 +42,7 @@ fn damage_to_kept_scans_is_an_error_and_changes_nothing() {
             let what = format!("{} at {offset}", path.display());
             let mut findings = Vec::new();
             verify(at(&disk), |finding| findings.push(finding.to_string()), |_, _| ()).unwrap();
-            let poses = NewPoses::Numbered(new_poses(&state.now.scans, 3, None));
+            let poses = NewPoses::Moving(new_poses(&state.now.scans, 3, None));
             let before = disk.files();
             let remapped =
                 scans(&disk).and_then(|scans| remap(&scans, &poses, &Remap::new(replay()), |_, _| ()));
@@ -80,7 +80,7 @@ fn segments_and_catalogs_that_are_missing_are_damage() {
     for path in names {
         let disk = whole.copy();
         disk.take(path);
-        let poses = NewPoses::Numbered(new_poses(&state.now.scans, 3, None));
+        let poses = NewPoses::Moving(new_poses(&state.now.scans, 3, None));
         let message = message_of(
             scans(&disk).and_then(|scans| remap(&scans, &poses, &Remap::new(replay()), |_, _| ())),
         );
@@ -187,7 +187,7 @@ fn scans_within_the_tolerance_are_unchanged_and_reported() {
 #[test]
 fn a_dry_run_and_a_stop_change_nothing() {
     let (disk, state) = a_map_with_kept_scans();
-    let poses = NewPoses::Numbered(new_poses(&state.now.scans, 5, Some(1)));
+    let poses = NewPoses::Moving(new_poses(&state.now.scans, 5, Some(1)));
     let before = disk.files();
     let dry = Remap::new(replay().with_dry_run(true));
     let dry = remap(&scans(&disk).unwrap(), &poses, &dry, |_, _| ()).unwrap().mapped;

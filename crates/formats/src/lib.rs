@@ -33,7 +33,7 @@ pub use crs_codes::epsg_code;
 pub use input_format::{Detection, InputFormat, Open, OpenCloud, OpenClouds, OpenScans};
 pub use open::{open_clouds, open_scans};
 pub use open_files::{DividedInputs, divide_inputs, open_scan_files};
-pub use poses::{CloudOptions, Deskew, PoseSource, RigidPose};
+pub use poses::{CloudOptions, PoseSource, RigidPose, SweepPeriods};
 pub use read::{
     CloudHead, CloudPoint, CloudSource, PoseAt, read_pcd, read_points, read_scan_graph, read_scan_log,
     read_scan_stream, read_scan_stream_with, stamp_of_name,

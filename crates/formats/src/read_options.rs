@@ -58,8 +58,8 @@ impl ReadOptions {
 
     /// Returns the attributes that readers need: the wanted ones, and classes to select by.
     pub(crate) fn attributes_to_read(&self) -> AttributeSet {
-        let AttributeSet { colours, classes } = self.attributes;
-        AttributeSet { colours, classes: classes || !self.classes.is_everything() }
+        let AttributeSet { colours, classes, .. } = self.attributes;
+        AttributeSet { colours, classes: classes || !self.classes.is_everything(), ..AttributeSet::NONE }
     }
 
     /// Returns all files that are not clouds, including those named in other options.

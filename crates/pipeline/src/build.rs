@@ -308,7 +308,7 @@ fn read_options(options: &BuildOptions, config: &MapConfig) -> ReadOptions {
         read.memory_bytes = for_reading(bytes);
     }
     let layers = config.layers();
-    read.attributes = AttributeSet { colours: layers.colour, classes: layers.class };
+    read.attributes = AttributeSet { colours: layers.colour, classes: layers.class, ..AttributeSet::NONE };
     read.clouds.has_no_returns = config.rays.no_return_range_m.is_some();
     if options.no_rays && read.poses.is_none() {
         read.clouds.may_lack_poses = true;

@@ -3,8 +3,8 @@ use crate::new_poses::{PoseFile, poses_for};
 use crate::place::{is_map_at, url_of};
 use rustc_hash::FxHashMap;
 use std::path::{Path, PathBuf};
-use voxtile::mapper::KeptScans;
-use voxtile::scan::{PointFrame, Pose, ScanPoints, Stop};
+use voxtile::mapper::{KeptScans, NewPose};
+use voxtile::scan::{PointFrame, ScanPoints, Stop};
 use voxtile::{Error, Result};
 use voxtile_formats::{PointStore, ScanHead, ScanSource};
 
@@ -13,7 +13,7 @@ pub struct KeptSource {
     path: PathBuf,
     scans: KeptScans,
     /// Poses that replace the scans' own, by scan number.
-    new_poses: FxHashMap<u64, Pose>,
+    new_poses: FxHashMap<u64, NewPose>,
     count: usize,
     crs: Option<String>,
     fingerprint: String,
@@ -66,27 +66,36 @@ impl ScanSource for KeptSource {
 
     fn read_scan(&mut self, points: &mut PointStore) -> Result<Option<ScanHead>> {
         let Some(scan) = self.scans.next().transpose()? else { return Ok(None) };
-        let Some(own) = scan.world_from_sensor() else {
+        if scan.world_from_sensor().is_none() {
             let reason = format!(
                 "scan {} has its points in the world frame and no pose; use `voxtile remap -o`, which needs none",
                 scan.number()
             );
             return Err(Error::argument(self.path.display().to_string(), reason));
+        }
+        let scan = match self.new_poses.get(&scan.number()) {
+            Some(new) => scan.with_pose(new.clone()),
+            None => scan,
         };
-        let world_from_sensor = self.new_poses.get(&scan.number()).copied().unwrap_or(own);
         points.begin_with(scan.has_intensities(), scan.attributes());
         let (mut pushed, all) = (Ok(()), 0..scan.len());
-        scan.for_each_attributed_chunk(all, PointFrame::Own, &mut |some, intensities, attributes| {
+        scan.for_each_attributed_chunk(all, PointFrame::Raw, &mut |some, intensities, attributes| {
             pushed = some.iter().enumerate().try_for_each(|(at, &point)| {
                 let intensity = intensities.map_or(0.0, |intensities| intensities[at]);
-                points.push_with(point, intensity, attributes.colour(at), attributes.class(at))
+                let (colour, class) = (attributes.colour(at), attributes.class(at));
+                points.push_with(point, intensity, colour, class, attributes.time_ns(at))
             });
             pushed.is_ok()
         })?;
         pushed?;
         points.set_moving(scan.moving().cloned());
-        let (name, stamp_ns) = (scan.number().to_string(), scan.stamp_ns());
-        Ok(Some(ScanHead { name, stamp_ns, world_from_sensor }))
+        points.set_sweep(scan.record().sweep.clone());
+        Ok(scan.world_from_sensor().map(|world_from_sensor| ScanHead {
+            name: scan.number().to_string(),
+            stamp_ns: scan.stamp_ns(),
+            world_from_sensor,
+            body_from_sensor: scan.body_from_sensor(),
+        }))
     }
 
     fn skip(&mut self, scans: usize) -> Result<usize> {

@@ -1,11 +1,12 @@
 use crate::sparse_poses::interpolated_poses;
 use std::path::Path;
-use voxtile::mapper::{KeptScanHead, KeptSummary};
+use std::sync::Arc;
+use voxtile::mapper::{KeptScanHead, KeptSummary, NewPose};
 use voxtile::operations::NewPoses;
 use voxtile::scan::Pose;
 use voxtile::{Error, Result};
 use voxtile_formats::ReadOptions;
-use voxtile_formats::poses::{Found, Trajectory};
+use voxtile_formats::poses::{Found, SweepPeriods, Trajectory};
 use voxtile_formats::{Budget, RigidPose};
 
 /// Maximum number of scans named in an error.
@@ -18,7 +19,7 @@ pub struct PoseFile<'a> {
     pub path: &'a Path,
     /// KITTI `calib.txt`, for poses of the camera.
     pub calib: Option<&'a Path>,
-    /// Pose of the sensor in the body frame, which the poses describe.
+    /// Pose of the sensor in the body frame, which the poses describe; `None` for that with which each scan was built.
     pub body_from_sensor: Option<RigidPose>,
     /// Maximum time from a scan to the nearer of the two poses around it, in nanoseconds.
     pub tolerance_ns: i64,
@@ -41,6 +42,15 @@ pub enum WhichScans {
 }
 
 impl<'a> PoseFile<'a> {
+    /// Returns the pose of the sensor of a scan in the body frame, if it is another frame.
+    fn mount_of(&self, scan: &KeptScanHead) -> Option<RigidPose> {
+        let of_build = scan.body_from_sensor.map(|[x, y, z, qx, qy, qz, qw]| RigidPose {
+            position_m: [x, y, z],
+            quaternion: [qx, qy, qz, qw],
+        });
+        self.body_from_sensor.or(of_build)
+    }
+
     /// Returns the pose file of the read options, or `None` if scans keep their own poses.
     pub fn of_reading(options: &'a ReadOptions) -> Option<Self> {
         let body = options.clouds.body_from_sensor;
@@ -65,7 +75,7 @@ pub fn poses_for(from: &PoseFile<'_>, scans: &KeptSummary) -> Result<NewPoses> {
     scans.check_keeps_all()?;
     let summary = scans;
     let scans = scans.scans();
-    let &PoseFile { path: file, calib, body_from_sensor, tolerance_ns, ref budget, which } = from;
+    let &PoseFile { path: file, calib, tolerance_ns, ref budget, which, .. } = from;
     if std::fs::metadata(file).is_ok_and(|meta| !meta.is_file() && !meta.is_dir()) {
         let reason = "is a FIFO, a socket or a device, but new poses may be read twice: save them to a file";
         return Err(Error::argument(file.display().to_string(), reason));
@@ -76,7 +86,7 @@ pub fn poses_for(from: &PoseFile<'_>, scans: &KeptSummary) -> Result<NewPoses> {
         trajectory.remarks().iter().for_each(|remark| log::warn!("{}: {remark}", file.display()));
     }
     if which != WhichScans::All {
-        let some = poses_of_some(&trajectory, file, scans, which, body_from_sensor.as_ref())?;
+        let some = poses_of_some(&trajectory, from, scans)?;
         return interpolated_poses(summary, &some);
     }
     let have_stamps = scans.iter().all(|scan| scan.stamp_ns.is_some());
@@ -94,25 +104,25 @@ pub fn poses_for(from: &PoseFile<'_>, scans: &KeptSummary) -> Result<NewPoses> {
                 );
                 Error::argument(file.display().to_string(), reason)
             })?;
-            poses.push(sensor_pose(&pose, body_from_sensor.as_ref())?);
+            let found = Found::Exact(pose);
+            poses.extend(new_pose(summary, scan, &trajectory, from, &found)?);
         }
-        return Ok(NewPoses::InOrder(poses));
+        return Ok(NewPoses::Moving(poses));
     }
     if !trajectory.has_stamps() || !have_stamps {
         let reason = other_number(trajectory.len(), scans);
         return Err(Error::argument(file.display().to_string(), reason));
     }
-    by_time(&trajectory, file, scans, tolerance_ns, body_from_sensor.as_ref())
+    by_time(&trajectory, from, summary)
 }
 
 /// Returns the poses of a part of the scans, by their numbers.
 fn poses_of_some(
     trajectory: &Trajectory,
-    file: &Path,
+    from: &PoseFile<'_>,
     scans: &[KeptScanHead],
-    which: WhichScans,
-    body_from_sensor: Option<&RigidPose>,
 ) -> Result<Vec<(u64, Pose)>> {
+    let PoseFile { path: file, which, .. } = *from;
     let wrong = |reason: String| Error::argument(file.display().to_string(), reason);
     let mut some = Vec::new();
     if let WhichScans::Every(step) = which {
@@ -127,7 +137,7 @@ fn poses_of_some(
         }
         for (number, scan) in scans.iter().step_by(step).enumerate() {
             if let Some(pose) = trajectory.by_number(number)? {
-                some.push((scan.number, sensor_pose(&pose, body_from_sensor)?));
+                some.push((scan.number, sensor_pose(&pose, from.mount_of(scan).as_ref())?));
             }
         }
         return Ok(some);
@@ -136,7 +146,7 @@ fn poses_of_some(
         // Poses between two are worse than what the scan did since the one before.
         let found = scan.stamp_ns.map(|stamp_ns| trajectory.at(stamp_ns, 0)).transpose()?;
         if let Some(Found::Exact(pose)) = found {
-            some.push((scan.number, sensor_pose(&pose, body_from_sensor)?));
+            some.push((scan.number, sensor_pose(&pose, from.mount_of(scan).as_ref())?));
         }
     }
     match some.is_empty() {
@@ -173,25 +183,19 @@ fn other_number(poses: usize, scans: &[KeptScanHead]) -> String {
     }
 }
 
-fn by_time(
-    trajectory: &Trajectory,
-    file: &Path,
-    scans: &[KeptScanHead],
-    tolerance_ns: i64,
-    body_from_sensor: Option<&RigidPose>,
-) -> Result<NewPoses> {
+fn by_time(trajectory: &Trajectory, from: &PoseFile<'_>, summary: &KeptSummary) -> Result<NewPoses> {
+    let scans = summary.scans();
     let (mut poses, mut missing) = (Vec::with_capacity(scans.len()), Vec::new());
     for scan in scans {
         let stamp_ns = scan.stamp_ns.unwrap_or_default();
-        match trajectory.at(stamp_ns, tolerance_ns)? {
-            Found::Exact(pose) | Found::Between(pose) => {
-                poses.push((scan.number, sensor_pose(&pose, body_from_sensor)?));
-            }
-            _ => missing.push(format!("{} at {:.6} s", scan.number, stamp_ns as f64 * 1e-9)),
+        let found = trajectory.at(stamp_ns, from.tolerance_ns)?;
+        match new_pose(summary, scan, trajectory, from, &found)? {
+            Some(pose) => poses.push(pose),
+            None => missing.push(format!("{} at {:.6} s", scan.number, stamp_ns as f64 * 1e-9)),
         }
     }
     if missing.is_empty() {
-        return Ok(NewPoses::Numbered(poses));
+        return Ok(NewPoses::Moving(poses));
     }
     let named = missing[..missing.len().min(MAX_NAMED)].join(", ");
     let more = match missing.len().saturating_sub(MAX_NAMED) {
@@ -200,7 +204,39 @@ fn by_time(
     };
     let reason =
         format!("has no pose close in time to scan {named}{more}; raise `pose_tolerance` to allow for more");
-    Err(Error::argument(file.display().to_string(), reason))
+    Err(Error::argument(from.path.display().to_string(), reason))
+}
+
+/// Returns the pose of a scan from that of the body, and its motion if its points have times and the poses have time
+/// stamps: as reading the scan with these poses would. `None` if the pose is unknown.
+fn new_pose(
+    summary: &KeptSummary,
+    scan: &KeptScanHead,
+    trajectory: &Trajectory,
+    from: &PoseFile<'_>,
+    found: &Found,
+) -> Result<Option<(u64, NewPose)>> {
+    let (Found::Exact(body) | Found::Between(body)) = found else { return Ok(None) };
+    let mount = from.mount_of(scan);
+    let sensor = |body: &RigidPose| mount.as_ref().map_or(*body, |sensor| body.then(sensor));
+    let mut new = NewPose::from(sensor_pose(body, mount.as_ref())?);
+    if let (Some(old), Some(stamp_ns)) = (summary.sweep(scan.number), scan.stamp_ns)
+        && trajectory.has_stamps()
+    {
+        let mut unreadable = None;
+        let sweep = SweepPeriods::of(old).sweep(stamp_ns, &sensor(body), |at_ns| {
+            match trajectory.at(at_ns, from.tolerance_ns) {
+                Ok(Found::Exact(body) | Found::Between(body)) => Some(sensor(&body)),
+                Ok(_) => None,
+                Err(error) => {
+                    unreadable.get_or_insert(error);
+                    None
+                }
+            }
+        });
+        new.sweep = Some(Arc::new(unreadable.map_or(sweep, Err)?));
+    }
+    Ok(Some((scan.number, new)))
 }
 
 fn sensor_pose(body: &RigidPose, body_from_sensor: Option<&RigidPose>) -> Result<Pose> {

@@ -6,8 +6,8 @@ use voxtile::{Digest, Result};
 const CONTEXT: &str = "voxtile 1 kept scans";
 
 /// Returns the digest of the scans that a map keeps, in order: equal for the same scans, whatever segments and numbers
-/// they have. It covers the points of each scan with their intensities, colours, classes and marks, its pose or origin,
-/// and its time stamp. `docs/format.md` specifies the bytes.
+/// they have. It covers the points of each scan with their intensities, colours, classes, times and marks, its pose or origin,
+/// its motion and mount, and its time stamp. `docs/format.md` specifies the bytes.
 ///
 /// # Errors
 ///
@@ -24,7 +24,8 @@ fn hash_scan(scan: &KeptScan, hasher: &mut blake3::Hasher) -> Result<()> {
     // A hash for each list, because points come in chunks of any length.
     let mut lists: [blake3::Hasher; 4] = Default::default();
     let mut bytes = Vec::new();
-    let (range, frame) = (0..scan.len(), PointFrame::Own);
+    let mut of_times = blake3::Hasher::new();
+    let (range, frame) = (0..scan.len(), PointFrame::Raw);
     scan.for_each_attributed_chunk(range, frame, &mut |points, intensities, attributes| {
         let [of_points, of_intensities, of_colours, of_classes] = &mut lists;
         let mut update = |list: &mut blake3::Hasher, fill: &dyn Fn(&mut Vec<u8>)| {
@@ -34,6 +35,9 @@ fn hash_scan(scan: &KeptScan, hasher: &mut blake3::Hasher) -> Result<()> {
         };
         update(of_points, &|out| {
             out.extend(points.as_flattened().iter().flat_map(|value| value.to_le_bytes()))
+        });
+        update(&mut of_times, &|out| {
+            out.extend(attributes.times_ns.iter().flat_map(|time| time.to_le_bytes()));
         });
         update(of_intensities, &|out| {
             out.extend(intensities.into_iter().flatten().flat_map(|value| value.to_le_bytes()));
@@ -67,5 +71,16 @@ fn hash_scan(scan: &KeptScan, hasher: &mut blake3::Hasher) -> Result<()> {
     });
     let marks: Vec<u8> = scan.moving().into_iter().flat_map(|marks| marks.iter()).map(u8::from).collect();
     hasher.update(blake3::hash(&marks).as_bytes());
+    if let Some(sweep) = scan.sweep() {
+        let mut bytes = Vec::new();
+        sweep.write(&mut bytes);
+        hasher.update(blake3::hash(&bytes).as_bytes());
+        hasher.update(of_times.finalize().as_bytes());
+    }
+    if let Some(mount) = scan.body_from_sensor() {
+        mount.iter().for_each(|number| {
+            hasher.update(&number.to_le_bytes());
+        });
+    }
     Ok(())
 }

@@ -28,6 +28,7 @@ fn map_of(layers: Layers, points: &[Point5]) -> InMemoryMapper {
         let attributes = PointAttributes {
             colours: of_scan.iter().map(|point| point.1.map(|(colour, _)| colour)).collect(),
             classes: of_scan.iter().map(|point| point.1.map(|(_, class)| class)).collect(),
+            ..PointAttributes::default()
         };
         // From far above, so that rays do not cross the voxels of others.
         let scan =

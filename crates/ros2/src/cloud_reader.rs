@@ -23,7 +23,7 @@ pub struct CloudReader {
 
 /// Returns the attributes of points that layers take.
 pub fn attributes_of(layers: &Layers) -> AttributeSet {
-    AttributeSet { colours: layers.colour, classes: layers.class }
+    AttributeSet { colours: layers.colour, classes: layers.class, ..AttributeSet::NONE }
 }
 
 impl CloudReader {

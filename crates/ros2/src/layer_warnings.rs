@@ -41,7 +41,8 @@ mod tests {
     #[test]
     fn each_layer_without_a_field_is_named_once() {
         let layers: Layers = "colour,class,time".parse().unwrap();
-        let attributes = PointAttributes { colours: Vec::new(), classes: vec![Some(1)] };
+        let attributes =
+            PointAttributes { colours: Vec::new(), classes: vec![Some(1)], ..PointAttributes::default() };
         let points = [[1.0; 3]];
         let scan = ScanRef::in_world([0.0; 3], &points).with_attributes(&attributes).unwrap();
         let mut warnings = LayerWarnings::default();

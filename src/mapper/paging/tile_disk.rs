@@ -307,7 +307,7 @@ impl TileDisk {
         let (mut written, put) = (Ok(()), &mut |block: &[u8]| archive.push_block(block));
         let all = 0..scan.len();
         let read =
-            scan.for_each_attributed_chunk(all, PointFrame::Own, &mut |points, intensities, attributes| {
+            scan.for_each_attributed_chunk(all, PointFrame::Raw, &mut |points, intensities, attributes| {
                 written = blocks.push(points, intensities, attributes, put);
                 written.is_ok()
             });

@@ -2,7 +2,7 @@ use crate::error::Result;
 use crate::mapper::KeptScan;
 use crate::scan::{
     AttributeSet, ChunkMarks, MovingMarks, MovingMarksBuilder, PointAttributes, PointFrame, Pose, ScanPoints,
-    TakeAttributed, TakePoints,
+    Sweep, TakeAttributed, TakePoints,
 };
 use crate::space::{Aabb, Point};
 use std::ops::Range;
@@ -45,16 +45,27 @@ impl<'a> FilteredScan<'a> {
         let to_world = self.to_world();
         let (mut number, mut goes_on) = (0, true);
         let (mut points, mut picked, mut of_picked) = (Vec::new(), Vec::new(), PointAttributes::default());
-        let all = 0..self.scan.len();
-        self.scan.for_each_attributed_chunk(all, PointFrame::Own, &mut |some, intensities, attributes| {
+        let (all, mut at_stamp) = (0..self.scan.len(), Vec::new());
+        self.scan.for_each_attributed_chunk(all, PointFrame::Raw, &mut |some, intensities, attributes| {
             points.clear();
             picked.clear();
             of_picked.clear();
-            for (at, &own) in some.iter().enumerate() {
+            let own = match self.scan.sweep() {
+                Some(sweep) => {
+                    sweep.move_all(some, attributes.times_ns, &mut at_stamp);
+                    &at_stamp
+                }
+                None => some,
+            };
+            for (at, (&raw, &own)) in some.iter().zip(own).enumerate() {
                 let in_world = to_world(own);
                 if self.takes(&in_world) {
                     if range.contains(&number) {
-                        points.push(if frame == PointFrame::Own { own } else { in_world });
+                        points.push(match frame {
+                            PointFrame::World => in_world,
+                            PointFrame::Own => own,
+                            PointFrame::Raw => raw,
+                        });
                         of_picked.extend(attributes.part(at..at + 1));
                         picked.extend(intensities.map(|intensities| intensities[at]));
                     }
@@ -109,6 +120,14 @@ impl ScanPoints for FilteredScan<'_> {
 
     fn attributes(&self) -> AttributeSet {
         self.scan.attributes()
+    }
+
+    fn sweep(&self) -> Option<&Sweep> {
+        self.scan.sweep()
+    }
+
+    fn body_from_sensor(&self) -> Option<[f64; 7]> {
+        self.scan.body_from_sensor()
     }
 
     fn for_each_attributed_chunk(

@@ -1,5 +1,5 @@
 use crate::error::{Error, Result};
-use crate::mapper::{KeptScanHead, KeptSummary};
+use crate::mapper::{KeptScanHead, KeptSummary, NewPose};
 use crate::scan::Pose;
 use rustc_hash::{FxHashMap, FxHashSet};
 
@@ -11,6 +11,8 @@ pub enum NewPoses {
     InOrder(Vec<Pose>),
     /// Poses by the number of the scan in the map. Other scans keep their pose.
     Numbered(Vec<(u64, Pose)>),
+    /// As before, with the motion of the sensor during each scan.
+    Moving(Vec<(u64, NewPose)>),
 }
 
 /// Maximum number of scans named in an error.
@@ -22,24 +24,30 @@ impl NewPoses {
     /// # Errors
     ///
     /// A scan without a pose, a pose without a scan, or a pose that is not finite.
-    pub fn by_number(&self, scans: &KeptSummary) -> Result<FxHashMap<u64, Pose>> {
+    pub fn by_number(&self, scans: &KeptSummary) -> Result<FxHashMap<u64, NewPose>> {
         let scans = scans.scans();
         match self {
             Self::InOrder(poses) => in_order(scans, poses),
             Self::Numbered(poses) => {
-                let known: FxHashSet<u64> = scans.iter().map(|scan| scan.number).collect();
-                let unknown =
-                    poses.iter().map(|(number, _)| *number).filter(|number| !known.contains(number));
-                refuse("the map keeps no scan with the number", unknown)?;
-                checked(poses.iter().copied())
+                check_numbers(scans, poses.iter().map(|(number, _)| *number))?;
+                checked(poses.iter().map(|(number, pose)| (*number, (*pose).into())))
+            }
+            Self::Moving(poses) => {
+                check_numbers(scans, poses.iter().map(|(number, _)| *number))?;
+                checked(poses.iter().cloned())
             }
         }
     }
 }
 
-fn in_order(scans: &[KeptScanHead], poses: &[Pose]) -> Result<FxHashMap<u64, Pose>> {
+fn check_numbers(scans: &[KeptScanHead], numbers: impl Iterator<Item = u64>) -> Result<()> {
+    let known: FxHashSet<u64> = scans.iter().map(|scan| scan.number).collect();
+    refuse("the map keeps no scan with the number", numbers.filter(|number| !known.contains(number)))
+}
+
+fn in_order(scans: &[KeptScanHead], poses: &[Pose]) -> Result<FxHashMap<u64, NewPose>> {
     if scans.len() == poses.len() {
-        return checked(scans.iter().map(|scan| scan.number).zip(poses.iter().copied()));
+        return checked(scans.iter().map(|scan| scan.number).zip(poses.iter().copied().map(NewPose::from)));
     }
     let surplus = poses.len().saturating_sub(scans.len());
     let reason = match scans.get(poses.len()) {
@@ -68,10 +76,11 @@ fn refuse(reason: &str, mut named: impl Iterator<Item = u64>) -> Result<()> {
     Err(Error::argument("poses", format!("{reason} {}{more}", first.join(", "))))
 }
 
-fn checked(poses: impl Iterator<Item = (u64, Pose)>) -> Result<FxHashMap<u64, Pose>> {
+fn checked(poses: impl Iterator<Item = (u64, NewPose)>) -> Result<FxHashMap<u64, NewPose>> {
     let mut by_number = FxHashMap::default();
     for (number, pose) in poses {
-        let is_finite = pose.position_m().iter().chain(&pose.quaternion()).all(|x| x.is_finite());
+        let sensor = &pose.world_from_sensor;
+        let is_finite = sensor.position_m().iter().chain(&sensor.quaternion()).all(|x| x.is_finite());
         if !is_finite {
             return Err(Error::argument("poses", format!("the pose of scan {number} is not finite")));
         }

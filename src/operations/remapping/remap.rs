@@ -2,8 +2,8 @@ use super::new_poses::NewPoses;
 use super::replay::{Replay, Replayed, replay};
 use super::revision::{Change, Changes};
 use crate::error::{Error, Result};
-use crate::mapper::{KeptScanHead, KeptSummary};
-use crate::scan::Pose;
+use crate::mapper::{KeptScanHead, KeptSummary, NewPose};
+use crate::scan::Sweep;
 use serde::Serialize;
 
 /// Options of a remap.
@@ -100,15 +100,24 @@ impl Remapped {
         let poses = poses.by_number(scans)?;
         for scan in scans.scans() {
             if let Some(pose) = poses.get(&scan.number)
-                && remapped.moves(scan, pose, how.tolerance)?
+                && remapped.moves(scan, scans.sweep(scan.number), pose, how.tolerance)?
             {
-                changes.insert(scan.number, Change::Move(*pose));
+                changes.insert(scan.number, Change::Move(pose.clone()));
             }
         }
         Ok((remapped, changes))
     }
 
-    fn moves(&mut self, scan: &KeptScanHead, new: &Pose, tolerance: Option<(f64, f64)>) -> Result<bool> {
+    fn moves(
+        &mut self,
+        scan: &KeptScanHead,
+        old_sweep: Option<&Sweep>,
+        new: &NewPose,
+        tolerance: Option<(f64, f64)>,
+    ) -> Result<bool> {
+        let NewPose { world_from_sensor: new, sweep } = new;
+        let is_same_motion =
+            old_sweep.is_none() || sweep.as_deref().is_none_or(|sweep| Some(sweep) == old_sweep);
         let Some(old) = scan.world_from_sensor else {
             let reason = format!(
                 "the points of scan {} are in the world frame, so a pose cannot move them; insert scans in the \
@@ -117,7 +126,7 @@ impl Remapped {
             );
             return Err(Error::argument("poses", reason));
         };
-        if old == *new {
+        if old == *new && is_same_motion {
             return Ok(false);
         }
         let between = old.isometry().inv_mul(new.isometry());

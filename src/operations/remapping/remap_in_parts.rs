@@ -5,8 +5,7 @@ use super::replay::{Replayed, clean_up_after_error, create_snapshot, open};
 use super::revision::{Change, Changes, MAX_POINTS_IN_MEMORY, PART_FOR_ALL};
 use crate::config::RayConfig;
 use crate::error::{Error, Result};
-use crate::mapper::{KeptScan, KeptSummary, OutOfCoreTileMapper, Remapper, TileFinder, frame_of};
-use crate::scan::Pose;
+use crate::mapper::{KeptScan, KeptSummary, NewPose, OutOfCoreTileMapper, Remapper, TileFinder};
 use crate::space::{Aabb, Grid, TileBox, TileIndex, TileSelection};
 use crate::store::{CatalogEntry, KeptRecord, MapPath, TileStore};
 use rustc_hash::{FxHashMap, FxHashSet};
@@ -20,6 +19,8 @@ pub struct RemapPart {
     replaced: Vec<[i32; 3]>,
     /// Moved scans that change tiles of the part.
     moved: Vec<MovedScan>,
+    /// First and last tile of its region.
+    region: [[i32; 3]; 2],
     /// Number of scans that were replayed, in whole or in part, and of their updates.
     scans_mapped: u64,
     updates_mapped: u64,
@@ -99,7 +100,11 @@ pub fn remap_part(
     };
     let mut replaced: Vec<_> = store.tiles().iter().filter(is_touched).map(TileIndex::to_array).collect();
     replaced.sort_unstable();
-    let mut part = RemapPart { replaced, ..RemapPart::default() };
+    let mut part = RemapPart {
+        replaced,
+        region: [region.min(), region.max()].map(TileIndex::to_array),
+        ..RemapPart::default()
+    };
     if touched.as_ref().is_some_and(FxHashSet::is_empty) {
         return Ok(part);
     }
@@ -127,7 +132,10 @@ pub fn remap_part(
             pose.is_none().then(|| record.tiles.iter().copied().filter(|tile| is_touched(tile)).collect());
         let number = record.number;
         let scan = KeptScan::open(&disk, store.layout(), record, MAX_POINTS_IN_MEMORY)?;
-        let scan = pose.map_or(scan.clone(), |pose| scan.with_pose(*pose));
+        let scan = match pose {
+            Some(pose) => scan.with_pose(pose.clone()),
+            None => scan,
+        };
         let (report, tiles) = mapper.replay_scan(number, &scan, &rays, selection.as_ref())?;
         let updates = report.hits + report.misses;
         part.scans_mapped += 1;
@@ -197,7 +205,8 @@ fn joined(
         replaced.into_iter().filter(|tile| store.tiles().contains(*tile)).collect();
     let kept: FxHashSet<TileIndex> = store.tiles().iter().filter(|tile| !replaced.contains(tile)).collect();
     let config = how.replay.config_of(&store)?;
-    let (map_id, mut records) = (store.map_id(), store.archive().records()?);
+    let (map_id, mut records, grid) = (store.map_id(), store.archive().records()?, config.grid);
+    let regions = regions_of(parts);
     let mut remapper = Remapper::begin(store, config, replaced, how.replay.stop.clone())?;
     while let Some(entry) = records.next_entry()? {
         how.replay.stop.check()?;
@@ -211,7 +220,14 @@ fn joined(
                     format!("no part replaces {tile}, which scan {} touched: pass all parts", record.number);
                 return Err(Error::argument("parts", reason));
             }
-            record.frame = frame_of(pose);
+            if !are_covered(reach_of(&record, pose, &grid)?, &regions) {
+                let reason = format!(
+                    "the new pose of scan {} reaches tiles of a missing part: pass all parts",
+                    record.number
+                );
+                return Err(Error::argument("parts", reason));
+            }
+            pose.put_in(&mut record);
             (record.updates, record.tiles) = moved.remove(&record.number).unwrap_or_default();
             record.tiles.sort_unstable();
         }
@@ -233,9 +249,34 @@ fn joined(
     remapper.finish(true, release)
 }
 
+/// Rectangles of tiles along x and y.
+type Columns = [[i64; 2]; 2];
+
+/// Returns the regions of all parts.
+fn regions_of(parts: &[(Option<MapPath>, RemapPart)]) -> BTreeSet<Columns> {
+    parts.iter().map(|(_, RemapPart { region: [min, max], .. })| columns_of(*min, *max)).collect()
+}
+
+fn columns_of(min: [i32; 3], max: [i32; 3]) -> Columns {
+    [0, 1].map(|axis| [min[axis], max[axis]].map(i64::from))
+}
+
+/// Returns whether disjoint regions cover all columns of tiles of a box.
+fn are_covered(tiles: TileBox, regions: &BTreeSet<Columns>) -> bool {
+    let wanted = columns_of(tiles.min().to_array(), tiles.max().to_array());
+    let common = |region: &Columns| {
+        let along = |axis: usize| {
+            let (first, last) = (wanted[axis][0].max(region[axis][0]), wanted[axis][1].min(region[axis][1]));
+            i128::from((last - first + 1).max(0))
+        };
+        along(0) * along(1)
+    };
+    regions.iter().map(common).sum::<i128>() >= common(&wanted)
+}
+
 /// New poses by the number of the scan.
 struct Moves {
-    poses: FxHashMap<u64, Pose>,
+    poses: FxHashMap<u64, NewPose>,
     /// Whether so many scans move that all tiles are replayed.
     are_most: bool,
 }
@@ -248,7 +289,7 @@ fn moves(scans: &KeptSummary, poses: &NewPoses, how: &Remap) -> Result<(Moves, T
     if store.commits().flush_number != scans.flush_number() {
         return Err(Error::Changed { path: folder.to_owned() });
     }
-    let poses: FxHashMap<u64, Pose> = changes
+    let poses: FxHashMap<u64, NewPose> = changes
         .into_iter()
         .filter_map(|(number, change)| match change {
             Change::Move(pose) => Some((number, pose)),
@@ -285,7 +326,7 @@ fn tiles_of_moved(
         }
         let Some(rays) = limited_to(region, &record) else { continue };
         let scan = KeptScan::open(&disk, store.layout(), record, MAX_POINTS_IN_MEMORY)?;
-        tiles.extend(finder.tiles_of(&scan.with_pose(*pose), &rays, store.folder())?);
+        tiles.extend(finder.tiles_of(&scan.with_pose(pose.clone()), &rays, store.folder())?);
     }
     Ok(tiles)
 }
@@ -298,7 +339,7 @@ fn limited_to(region: TileBox, record: &KeptRecord) -> Option<RayConfig> {
 }
 
 /// A box around the tiles that a scan can change with a new pose: its rays are as long as before.
-fn reach_of(record: &KeptRecord, pose: &Pose, grid: &Grid) -> Result<TileBox> {
+fn reach_of(record: &KeptRecord, new: &NewPose, grid: &Grid) -> Result<TileBox> {
     let longest_m = match record.rays.region {
         // Rays may end beyond the tiles of a region.
         Some(_) => record.rays.max_range_m.ok_or_else(|| {
@@ -316,10 +357,13 @@ fn reach_of(record: &KeptRecord, pose: &Pose, grid: &Grid) -> Result<TileBox> {
                 };
                 (0..3).map(|k| axis(k).powi(2)).sum::<f64>().sqrt()
             };
-            record.tiles.iter().map(far_m).fold(0.0, f64::max)
+            // The range of a point when it was measured differs from that at the stamp by the motion between.
+            let moved_m: f64 =
+                [&record.sweep, &new.sweep].into_iter().flatten().map(|sweep| sweep.reach_m()).sum();
+            record.tiles.iter().map(far_m).fold(0.0, f64::max) + moved_m
         }
     };
-    let (position, reach_m) = (pose.position_m(), longest_m + grid.resolution_m());
+    let (position, reach_m) = (new.world_from_sensor.position_m(), longest_m + grid.resolution_m());
     let around = Aabb { min: position.map(|k| k - reach_m), max: position.map(|k| k + reach_m) };
     let voxels = grid.voxels_in(&around);
     let last = voxels.end.map(|k| k.saturating_sub(1));

@@ -3,8 +3,8 @@ use super::filtered_scan::FilteredScan;
 use super::replay::{Replay, Replayed};
 use crate::config::{GUARD_REACH, MapConfig};
 use crate::error::{Error, Result};
-use crate::mapper::{KeptScan, KeptSummary, Remapper, TileFinder};
-use crate::scan::{ChunkMarks, MovingMarks, Pose, ScanPoints, ScanReport};
+use crate::mapper::{KeptScan, KeptSummary, NewPose, Remapper, TileFinder};
+use crate::scan::{ChunkMarks, MovingMarks, ScanPoints, ScanReport};
 use crate::space::{Aabb, Grid, TileBox, TileIndex, TileSelection};
 use crate::store::{CatalogEntry, Disk, KeptRecord, Layout, TileStore};
 use rustc_hash::{FxHashMap, FxHashSet};
@@ -16,7 +16,7 @@ use std::time::Instant;
 /// Change of a scan. Other scans are unchanged.
 #[derive(Clone, Debug)]
 pub(super) enum Change {
-    Move(Pose),
+    Move(NewPose),
     Remove,
     /// Removes the points in a box.
     Filter(Aabb),
@@ -164,7 +164,9 @@ impl Revision {
             let scan = self.open(store.layout(), record)?;
             let (rays, updates) = (*scan.rays(), scan.record().updates);
             tiles.extend(match change {
-                Change::Move(pose) => finder.tiles_of(&scan.with_pose(*pose), &rays, store.folder())?,
+                Change::Move(pose) => {
+                    finder.tiles_of(&scan.with_pose(pose.clone()), &rays, store.folder())?
+                }
                 Change::Filter(region) => {
                     let lost = FilteredScan::new(&scan, *region, true)?;
                     finder.tiles_of(&lost, &rays, store.folder())?
@@ -236,15 +238,19 @@ impl Revision {
         map: impl FnOnce(&KeptScan, Option<&TileSelection>) -> Result<(ScanReport, Vec<TileIndex>)>,
     ) -> Result<KeptRecord> {
         let pose = match self.changes.get(&record.number) {
-            Some(Change::Move(pose)) => Some(*pose),
+            Some(Change::Move(pose)) => Some(pose.clone()),
             _ => None,
         };
         if pose.is_none() && !touched.has_any_of(&record) {
             return Ok(record);
         }
         let scan = self.open(layout, record)?;
-        let scan = pose.map_or(scan.clone(), |pose| scan.with_pose(pose));
-        self.map_points(scan.record().clone(), touched, pose.is_some(), |selection| map(&scan, selection))
+        let is_moved = pose.is_some();
+        let scan = match pose {
+            Some(pose) => scan.with_pose(pose),
+            None => scan,
+        };
+        self.map_points(scan.record().clone(), touched, is_moved, |selection| map(&scan, selection))
     }
 
     /// Replays the affected tiles and commits. Also returns the result of removing files that are no longer needed.
@@ -319,8 +325,8 @@ impl Revision {
                 self.copy_out(remapper, &mut record)?;
                 match change {
                     Some(Change::Move(pose)) => {
+                        pose.put_in(&mut record);
                         scan = scan.with_pose(pose);
-                        record.frame = scan.record().frame;
                     }
                     Some(Change::Mark(marks)) => {
                         let marks = marks.of(&scan)?;

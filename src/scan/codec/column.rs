@@ -292,7 +292,7 @@ impl ColumnReader {
     }
 }
 
-fn word_bytes(input: &mut BlockInput<'_>) -> Result<usize, FormatError> {
+pub(super) fn word_bytes(input: &mut BlockInput<'_>) -> Result<usize, FormatError> {
     match usize::from(input.byte()?) {
         bytes @ 0..=8 => Ok(bytes),
         _ => Err(input.wrong("values of more than eight bytes")),

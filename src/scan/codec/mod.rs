@@ -1,7 +1,7 @@
 //! Lossless compression of the points of a scan, in blocks that are encoded and decoded independently.
 //!
 //! ```text
-//! points -> columns z, x, y, intensity, colour, class -> words (bits, differences, or integers of a grid) -> planes of bytes -> zstd
+//! points -> columns z, x, y, intensity, colour, class, time -> words (bits, differences, or integers of a grid) -> planes of bytes -> zstd
 //! ```
 //!
 //! The low bytes of a measured coordinate are noise and are stored unchanged. Parts with less variation are compressed:
@@ -38,6 +38,7 @@ const VERSION: u8 = 1;
 const INTENSITIES: u8 = 1;
 const COLOURS: u8 = 2;
 const CLASSES: u8 = 4;
+const TIMES: u8 = 8;
 
 /// Bytes of a colour and of a class, with a bit above them that is set if the point has one.
 const COLOUR_BYTES: usize = 4;

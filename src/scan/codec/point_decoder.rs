@@ -1,7 +1,7 @@
-use super::column::ColumnReader;
+use super::column::{ColumnReader, word_bytes};
 use super::planes::BlockInput;
-use super::words::Width;
-use super::{CLASS_BYTES, CLASSES, COLOUR_BYTES, COLOURS, INTENSITIES, MAX_POINTS, VERSION};
+use super::words::{Width, unzigzag};
+use super::{CLASS_BYTES, CLASSES, COLOUR_BYTES, COLOURS, INTENSITIES, MAX_POINTS, TIMES, VERSION};
 use crate::error::FormatError;
 use crate::scan::PointAttributes;
 use crate::space::Point;
@@ -33,7 +33,7 @@ impl PointDecoder {
             return Err(input.wrong("a block of points of a newer version"));
         }
         let set = input.byte()?;
-        if set & !(INTENSITIES | COLOURS | CLASSES) != 0 {
+        if set & !(INTENSITIES | COLOURS | CLASSES | TIMES) != 0 {
             return Err(input.wrong("a block of points with unknown columns"));
         }
         let has_intensities = set & INTENSITIES != 0;
@@ -60,6 +60,15 @@ impl PointDecoder {
         if set & CLASSES != 0 {
             let words = columns.take_words(count, CLASS_BYTES, &mut input)?;
             attributes.classes.extend(words.iter().map(|word| (word >> 8 == 1).then_some(*word as u8)));
+        }
+        if set & TIMES != 0 {
+            let bytes = word_bytes(&mut input)?;
+            let mut time = 0_i64;
+            let words = columns.take_words(count, bytes, &mut input)?;
+            attributes.times_ns.extend(words.iter().map(|word| {
+                time = time.wrapping_add(unzigzag(*word));
+                time
+            }));
         }
         match input.is_at_end() {
             true => Ok(has_intensities),

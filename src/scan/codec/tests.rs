@@ -1,5 +1,5 @@
 use super::*;
-use crate::scan::{AttributeSlices, PointAttributes};
+use crate::scan::{AttributeSlices, NO_TIME, PointAttributes};
 use crate::space::Point;
 use proptest::prelude::*;
 
@@ -209,14 +209,24 @@ fn print_sizes_and_times_of_real_sets() {
 }
 
 #[test]
-fn colours_and_classes_round_trip() {
+fn attributes_round_trip() {
     let points = turn(3000, &mut 3);
     let colours: Vec<_> = (0..3000).map(|k| (k % 7 > 0).then_some([k as u8, (k / 3) as u8, 255])).collect();
     let classes: Vec<_> = (0..3000).map(|k| (k % 5 > 0).then_some((k / 300) as u8)).collect();
-    for (has_colours, has_classes) in [(true, true), (true, false), (false, true)] {
+    let times_ns: Vec<_> = (0..3000).map(|k| 55_296 * k - 1_000_000).collect();
+    let odd_times = [NO_TIME, i64::MAX, 0, -1, NO_TIME].into_iter().cycle().take(3000).collect();
+    let cases = [
+        (true, true, Vec::new()),
+        (true, false, times_ns.clone()),
+        (false, true, odd_times),
+        (false, false, vec![0; 3000]),
+        (false, false, times_ns),
+    ];
+    for (has_colours, has_classes, times_ns) in cases {
         let attributes = PointAttributes {
             colours: if has_colours { colours.clone() } else { Vec::new() },
             classes: if has_classes { classes.clone() } else { Vec::new() },
+            times_ns,
         };
         let (mut block, mut decoded, mut intensities) = Default::default();
         PointEncoder::default().encode(&points, None, attributes.all(), &mut block).unwrap();

@@ -76,6 +76,7 @@ impl<'a> ScanRays<'a> {
                 let attributes = AttributeSlices {
                     colours: if layers.colour { attributes.colours } else { &[] },
                     classes: if layers.class { attributes.classes } else { &[] },
+                    times_ns: &[],
                 };
                 take(points, intensities, attributes)
             },

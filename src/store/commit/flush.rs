@@ -165,6 +165,7 @@ impl TileStore {
             self.committer.fill_in(begun.metadata.clone(), &self.files, &self.versions, numbers);
         if let Some(ext) = &mut metadata.ext {
             ext.keeps_scans = self.archive.is_on();
+            ext.keeps_motion = self.archive.has_motion();
         }
         metadata
     }

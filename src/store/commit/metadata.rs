@@ -66,6 +66,9 @@ pub struct Extension {
     /// Whether the map keeps its scans.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub keeps_scans: bool,
+    /// Whether the map keeps scans with the motion of the sensor, or once did.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub keeps_motion: bool,
     /// Catalog of kept scans as of the last flush; `None` in maps of versions that did not record it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub catalog: Option<CatalogVersion>,
@@ -148,6 +151,9 @@ const VERSION: &str = "1.0";
 const GUARDED_VERSION: &str = "1.1";
 /// Version of maps with layers. Programs which do not know them would drop them.
 const LAYERED_VERSION: &str = "1.2";
+/// Version of maps that keep the motion of the sensor. Programs which do not know it would take such scans for damage.
+const MOTION_VERSION: &str = "1.3";
+const VERSIONS: [&str; 4] = [VERSION, GUARDED_VERSION, LAYERED_VERSION, MOTION_VERSION];
 /// The file ends with a checksum of all bytes before it.
 const CHECKSUM_KEY: &str = "    \"crc32\": \"";
 const END: &str = "\"\n  }\n}\n";
@@ -210,6 +216,9 @@ impl Metadata {
     fn version(&self) -> &'static str {
         let Some(ext) = &self.ext else { return VERSION };
         let is_guarded = ext.rays.clearing().guard().is_some();
+        if ext.keeps_motion {
+            return MOTION_VERSION;
+        }
         match (ext.layers.is_none(), is_guarded) {
             (false, _) => LAYERED_VERSION,
             (true, true) => GUARDED_VERSION,
@@ -245,10 +254,11 @@ impl Metadata {
         let document: Document = serde_json::from_str(text).map_err(|error| {
             FormatError::at_line(error.line() as u64, format!("not a map's metadata: {error}"))
         })?;
-        if ![VERSION, GUARDED_VERSION, LAYERED_VERSION].contains(&document.version.as_str()) {
-            let known =
-                format!("this program reads {VERSION:?}, {GUARDED_VERSION:?} and {LAYERED_VERSION:?}");
-            let reason = format!("version {:?} is not known; {known}", document.version);
+        if !VERSIONS.contains(&document.version.as_str()) {
+            let reason = format!(
+                "version {:?} is not known; this program reads {VERSION:?} to {MOTION_VERSION:?}",
+                document.version
+            );
             return Err(FormatError::at_offset(0, reason));
         }
         // A checksum without `ext` indicates a damaged key, not a file of the original format.
@@ -314,6 +324,7 @@ mod tests {
             layers: Layers::NONE,
             crs: None,
             keeps_scans: false,
+            keeps_motion: false,
             catalog: None,
             scan_records: None,
             snapshots: None,

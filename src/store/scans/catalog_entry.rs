@@ -1,6 +1,8 @@
 use super::scan_record::ScanRecord;
 use crate::config::RayConfig;
+use crate::sensor::Sweep;
 use crate::space::{Point, TileIndex, put_number};
+use std::sync::Arc;
 
 /// Location of the points of a kept scan in a segment.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -56,6 +58,11 @@ pub struct KeptRecord {
     pub place: SegmentPlace,
     /// Marks of moving points, if there are any.
     pub moving: Option<KeptMarks>,
+    /// Motion of the sensor during the scan. Its points have times then, and are as measured.
+    pub sweep: Option<Arc<Sweep>>,
+    /// Pose of the sensor in the body frame that the trajectory describes, if known: position in metres and quaternion x,
+    /// y, z, w.
+    pub body_from_sensor: Option<[f64; 7]>,
     /// Tiles that the scan changes, in order.
     pub tiles: Vec<TileIndex>,
 }
@@ -86,6 +93,8 @@ const HAS_INTENSITIES: u8 = 2;
 const HAS_MOVING: u8 = 8;
 const HAS_COLOURS: u8 = 16;
 const HAS_CLASSES: u8 = 32;
+const HAS_SWEEP: u8 = 64;
+const HAS_MOUNT: u8 = 128;
 const HAS_STAMP: u8 = 4;
 
 impl KeptRecord {
@@ -94,6 +103,11 @@ impl KeptRecord {
         match self.frame {
             KeptFrame::Sensor([x, y, z, ..]) | KeptFrame::World([x, y, z]) => [x, y, z],
         }
+    }
+
+    /// Returns whether programs before version 1.3 of the format misread the record.
+    pub(super) fn has_motion(&self) -> bool {
+        self.sweep.is_some() || self.body_from_sensor.is_some()
     }
 
     /// Returns whether the scan has marks of moving points that are lost to damage.
@@ -141,7 +155,10 @@ impl CatalogEntry {
     /// Approximate heap memory in bytes.
     pub(super) fn heap_bytes(&self) -> usize {
         match self {
-            Self::Kept(scan) => size_of::<KeptRecord>() + scan.tiles.capacity() * size_of::<TileIndex>(),
+            Self::Kept(scan) => {
+                let of_sweep = scan.sweep.as_ref().map_or(0, |sweep| sweep.heap_bytes());
+                size_of::<KeptRecord>() + scan.tiles.capacity() * size_of::<TileIndex>() + of_sweep
+            }
             Self::Operation(what) => what.capacity(),
             _ => 0,
         }
@@ -199,6 +216,8 @@ fn write_kept(scan: &KeptRecord, out: &mut Vec<u8>) {
         (scan.has_colours, HAS_COLOURS),
         (scan.has_classes, HAS_CLASSES),
         (scan.moving.is_some(), HAS_MOVING),
+        (scan.sweep.is_some(), HAS_SWEEP),
+        (scan.body_from_sensor.is_some(), HAS_MOUNT),
     ];
     out.push(flags.iter().map(|(is_set, flag)| if *is_set { *flag } else { 0 }).sum());
     match &scan.frame {
@@ -212,6 +231,10 @@ fn write_kept(scan: &KeptRecord, out: &mut Vec<u8>) {
         let SegmentPlace { segment, offset, bytes } = place.unwrap_or_default();
         [marked, segment, offset, bytes].iter().for_each(|n| out.extend(n.to_le_bytes()));
     }
+    if let Some(sweep) = &scan.sweep {
+        sweep.write(out);
+    }
+    scan.body_from_sensor.iter().flatten().for_each(|x| out.extend(x.to_le_bytes()));
     let rays = serde_json::to_string(&scan.rays).unwrap_or_default();
     put_number(rays.len() as u64, out);
     out.extend(rays.as_bytes());
@@ -241,6 +264,14 @@ fn read_kept(input: &mut Input<'_>) -> Option<KeptRecord> {
             Some(KeptMarks { marked, place })
         }
     };
+    let sweep = match flags & HAS_SWEEP {
+        0 => None,
+        _ => Some(input.sweep()?),
+    };
+    let body_from_sensor = match flags & HAS_MOUNT {
+        0 => None,
+        _ => Some(input.doubles()?),
+    };
     let rays_bytes = input.packed_u64()?;
     let rays = serde_json::from_slice(input.take(usize::try_from(rays_bytes).ok()?)?).ok()?;
     let count = input.packed_u64()?;
@@ -267,6 +298,8 @@ fn read_kept(input: &mut Input<'_>) -> Option<KeptRecord> {
         updates,
         place: SegmentPlace { segment, offset, bytes },
         moving,
+        sweep,
+        body_from_sensor,
         tiles,
     })
 }
@@ -306,6 +339,12 @@ impl Input<'_> {
         self.numbers().map(|numbers| numbers.map(f64::from_bits))
     }
 
+    fn sweep(&mut self) -> Option<Arc<Sweep>> {
+        let (sweep, rest) = Sweep::read(self.0)?;
+        self.0 = rest;
+        Some(Arc::new(sweep))
+    }
+
     fn stamp(&mut self) -> Option<Option<i64>> {
         let flag = self.byte()?;
         let stamp_ns = self.number()? as i64;
@@ -330,9 +369,11 @@ impl Input<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use nalgebra::Isometry3;
 
     fn entries() -> Vec<CatalogEntry> {
         let rays = RayConfig { max_range_m: Some(60.5), ..RayConfig::default() };
+        let sweep = Sweep::new([(0, Some(Isometry3::identity())), (50, None)]).unwrap();
         let scan = KeptRecord {
             number: 7,
             stamp_ns: Some(-3),
@@ -348,6 +389,8 @@ mod tests {
                 marked: 5,
                 place: Some(SegmentPlace { segment: 4, offset: 9, bytes: 8 }),
             }),
+            sweep: Some(Arc::new(sweep)),
+            body_from_sensor: Some([1.5, 0.0, 2.0, 0.0, 0.0, 0.0, 1.0]),
             tiles: vec![TileIndex::new(-5, i32::MAX, 0), TileIndex::new(i32::MAX, i32::MIN, 2)],
         };
         let in_world = KeptRecord {
@@ -356,6 +399,8 @@ mod tests {
             has_colours: false,
             has_classes: true,
             moving: None,
+            sweep: None,
+            body_from_sensor: None,
             stamp_ns: None,
             tiles: vec![],
             ..scan.clone()

@@ -23,6 +23,8 @@ pub struct ScanArchive {
     files: MapFiles,
     /// Whether the map keeps its scans.
     is_on: bool,
+    /// Whether it has, or once had, scans with the motion of the sensor.
+    has_motion: bool,
     /// Kept scans as of the last commit.
     last_commit: KeptAsOf,
     /// Catalog as of the last commit, if there is one; `None` before it was searched for.
@@ -95,10 +97,15 @@ impl fmt::Debug for SegmentWriter {
 }
 
 impl ScanArchive {
-    pub(in crate::store) fn new(files: MapFiles, is_on: bool, last_commit: KeptAsOf) -> Self {
+    pub(in crate::store) fn new(
+        files: MapFiles,
+        [is_on, has_motion]: [bool; 2],
+        last_commit: KeptAsOf,
+    ) -> Self {
         Self {
             files,
             is_on,
+            has_motion,
             last_commit,
             committed: None,
             pending: Vec::new(),
@@ -118,6 +125,10 @@ impl ScanArchive {
     /// Returns whether the map keeps its scans.
     pub fn is_on(&self) -> bool {
         self.is_on
+    }
+
+    pub(in crate::store) fn has_motion(&self) -> bool {
+        self.has_motion
     }
 
     pub(crate) fn last_commit(&self) -> KeptAsOf {
@@ -295,8 +306,9 @@ impl ScanArchive {
         if !self.is_on {
             return;
         }
-        if matches!(entry, CatalogEntry::Kept(_)) {
+        if let CatalogEntry::Kept(scan) = &entry {
             self.scan_start = None;
+            self.has_motion |= scan.has_motion();
         }
         // Entries of a commit in progress must not change.
         let own = self.pending.get_mut(self.begun_entries..).unwrap_or_default();
@@ -335,6 +347,9 @@ impl ScanArchive {
     /// An I/O error.
     pub fn put(&mut self, entry: &CatalogEntry) -> Result<()> {
         let Some(Replacement::Open { generation, out }) = &mut self.replacement else { return Ok(()) };
+        if let CatalogEntry::Kept(scan) = entry {
+            self.has_motion |= scan.has_motion();
+        }
         let out = out.get_mut().unwrap_or_else(PoisonError::into_inner);
         out.put(entry, *generation)
             .map_err(|error| Error::io(&self.files.layout().catalog(*generation), "write", error))
@@ -359,6 +374,7 @@ impl ScanArchive {
     /// Resets the kept scans to those of an earlier commit.
     pub(in crate::store) fn rewind(&mut self, past: &Self) -> Result<()> {
         self.is_on = past.is_on;
+        self.has_motion |= past.has_motion;
         if !past.is_on {
             return Ok(());
         }

@@ -51,7 +51,7 @@ pub fn is_removed(one_in: i32, tile: TileIndex) -> bool {
 
 /// Performs an act on the map of a disk; `before` is the naive map before it.
 pub fn perform(disk: &FaultyDisk, config: &MapConfig, before: &State, act: &Act) -> Result<()> {
-    let poses = |seed, rest| NewPoses::Numbered(new_poses(&before.now.scans, seed, rest));
+    let poses = |seed, rest| NewPoses::Moving(new_poses(&before.now.scans, seed, rest));
     match act {
         Act::Scans(seeds) => {
             let mut mapper = open_or_create(disk, config)?;

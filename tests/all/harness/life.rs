@@ -44,7 +44,7 @@ impl Life {
         for next in meanwhile.start + 1..=meanwhile.end {
             if before.after(&Act::Scans(meanwhile.start..next), &self.config).is_on(disk) {
                 assert_eq!(damage_in(disk), BTreeSet::new(), "{what}");
-                let poses = NewPoses::Numbered(new_poses(&before.now.scans, *seed, *rest));
+                let poses = NewPoses::Moving(new_poses(&before.now.scans, *seed, *rest));
                 let mut mapper = open_or_create(disk, &self.config).unwrap();
                 let mut online =
                     OnlineRemap::begin(&scans(disk).unwrap(), &poses, &Remap::new(replay())).unwrap();

@@ -60,7 +60,7 @@ fn kept_scans(reader: &MapReader) -> BTreeMap<u64, Taken> {
         let scan = scan.unwrap();
         let (mut points, mut intensities, mut attributes) =
             (Vec::new(), Vec::new(), PointAttributes::default());
-        let (range, frame) = (0..scan.len(), PointFrame::Own);
+        let (range, frame) = (0..scan.len(), PointFrame::Raw);
         scan.for_each_attributed_chunk(range, frame, &mut |some, of_some, attributes_of_some| {
             points.extend_from_slice(some);
             intensities.extend_from_slice(of_some.unwrap());
@@ -70,7 +70,8 @@ fn kept_scans(reader: &MapReader) -> BTreeMap<u64, Taken> {
         .unwrap();
         let is_moving = scan.moving().map_or(vec![false; points.len()], |marks| marks.iter().collect());
         let (stamp_ns, pose) = (scan.stamp_ns(), scan.world_from_sensor().unwrap());
-        (scan.number(), Taken { points, intensities, attributes, stamp_ns, is_moving, pose })
+        let sweep = scan.record().sweep.clone();
+        (scan.number(), Taken { points, intensities, attributes, stamp_ns, is_moving, pose, sweep })
     });
     kept.collect()
 }
@@ -99,7 +100,7 @@ impl State {
             }
             Act::Move { seed, rest } => {
                 for (number, pose) in new_poses(&now.scans, *seed, *rest) {
-                    now.scans.get_mut(&number).unwrap().pose = pose;
+                    now.scans.get_mut(&number).unwrap().move_to(pose);
                 }
                 now.replay(config);
             }

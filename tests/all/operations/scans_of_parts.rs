@@ -66,7 +66,7 @@ fn columns() -> [TileBox; 3] {
 
 fn move_all(disk: &FaultyDisk, name: &str, content: &Content, seed: u64) -> Result<()> {
     let scans = KeptSummary::read(at(disk, name))?;
-    let poses = NewPoses::Numbered(new_poses(&content.scans, seed, None));
+    let poses = NewPoses::Moving(new_poses(&content.scans, seed, None));
     remap(&scans, &poses, &Remap::new(replay()), |_, _| ()).map(drop)
 }
 
@@ -113,7 +113,7 @@ fn shards_that_keep_their_scans_join_to_the_map_of_one_build() {
             move_all(&disk, name, &expected, 9).unwrap();
         }
         for (number, pose) in new_poses(&expected.scans, 9, None) {
-            expected.scans.get_mut(&number).unwrap().pose = pose;
+            expected.scans.get_mut(&number).unwrap().move_to(pose);
         }
         assert_eq!(records(&disk, "joined"), records(&disk, "whole"));
         let [joined, whole] = ["joined", "whole"].map(|name| open(&disk, &path(name)).unwrap());

@@ -62,6 +62,7 @@ pub fn random_stamp_ns(random: &mut Random) -> Option<i64> {
 pub fn retain_attributes(attributes: &mut PointAttributes, keeps: &[bool]) {
     retain_marked(&mut attributes.colours, keeps);
     retain_marked(&mut attributes.classes, keeps);
+    retain_marked(&mut attributes.times_ns, keeps);
 }
 
 /// Keeps the marked entries.

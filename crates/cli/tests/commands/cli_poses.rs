@@ -269,3 +269,99 @@ fn long_comments_in_a_file_of_poses_are_skipped() {
         refusal(&["scans", text(&scans), "--poses", text(&poses)]).contains("line 1: the line is longer")
     );
 }
+
+/// Clouds whose points have times, with a pose file; `bend` sets how the body moves.
+fn turning_clouds(folder: &Path, bend: f64, name: &str) -> (PathBuf, PathBuf) {
+    let scans = folder.join("turning");
+    fs::create_dir_all(&scans).unwrap();
+    for scan in 0..4_i64 {
+        let mut text = "x,y,z,t[ns]\n".to_owned();
+        for point in 0..400_i64 {
+            let angle = f64::from(point as i32) * 0.016;
+            let (sin, cos) = angle.sin_cos();
+            text += &format!(
+                "{:.3},{:.3},{:.3},{}\n",
+                8.0 * cos,
+                6.0 * sin,
+                (point % 7) as f64 * 0.2,
+                250_000 * point
+            );
+        }
+        fs::write(scans.join(format!("{}.csv", 1_700_000_000_000_000_000 + 100_000_000 * scan)), text)
+            .unwrap();
+    }
+    let mut text = String::new();
+    for step in -10..60_i64 {
+        let s = step as f64 * 0.01;
+        let half = 0.5 * bend * s;
+        let stamp_ns = 1_700_000_000_000_000_000 + 10_000_000 * step;
+        let (seconds, rest) = (stamp_ns.div_euclid(1_000_000_000), stamp_ns.rem_euclid(1_000_000_000));
+        text += &format!(
+            "{seconds}.{rest:09} {} {} 0 0 0 {} {}\n",
+            9.0 * s,
+            bend * s * s,
+            half.sin(),
+            half.cos()
+        );
+    }
+    let poses = folder.join(name);
+    fs::write(&poses, text).unwrap();
+    (scans, poses)
+}
+
+/// A corrected trajectory corrects the shape of each scan too: as if the scans had been read with it.
+#[test]
+fn new_poses_deskew_kept_scans_again() {
+    let folder = TempDir::new().unwrap();
+    let (scans, old) = turning_clouds(folder.path(), 1.0, "old.tum");
+    let (_, new) = turning_clouds(folder.path(), 2.5, "new.tum");
+    let mount = ["--extrinsic", "0.3", "0", "1.5", "0", "0", "0.1", "0.99498743710662"];
+    let map = |name: &str| folder.path().join(name);
+    let build = |name: &str, poses: &Path, more: &[&str]| {
+        let path = map(name);
+        let to = [
+            "build",
+            text(&scans),
+            "-o",
+            text(&path),
+            "--poses",
+            text(poses),
+            "--resolution",
+            "0.1",
+            "--quiet",
+        ];
+        voxtile(&[&to[..], &mount, more].concat()).assert().success();
+        path
+    };
+    let digest = |path: &Path, more: &[&str]| {
+        let output = voxtile(&[&["digest", text(path)], more].concat()).output().unwrap();
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        String::from_utf8(output.stdout).unwrap().split_whitespace().next().unwrap().to_owned()
+    };
+    let keeping = ["--deskew", "--keep-scans"];
+    let [kept, wanted] = [build("kept", &old, &keeping), build("wanted", &new, &keeping)];
+    assert_eq!(digest(&kept, &[]), digest(&build("unkept", &old, &["--deskew"]), &[]));
+    assert_ne!(digest(&kept, &[]), digest(&build("skewed", &old, &[]), &[]));
+    let before = digest(&kept, &["--scans"]);
+    // The pose of the sensor in the body frame is kept with the scans.
+    voxtile(&["remap", text(&kept), "--poses", text(&new), "--quiet"]).assert().success();
+    assert_eq!(digest(&kept, &[]), digest(&wanted, &[]));
+    assert_eq!(digest(&kept, &["--scans"]), digest(&wanted, &["--scans"]));
+    voxtile(&["remap", text(&kept), "--poses", text(&old), "--quiet"]).assert().success();
+    assert_eq!(digest(&kept, &["--scans"]), before);
+    // Another map, of finer voxels, from the kept scans.
+    let [fine, other] = ["fine", "other"].map(map);
+    let finer = ["--resolution", "0.05", "--quiet"];
+    voxtile(&[&["remap", text(&kept), "-o", text(&fine)], &finer[..]].concat()).assert().success();
+    let whole = ["build", text(&scans), "-o", text(&other), "--deskew", "--poses", text(&old)];
+    voxtile(&[&whole[..], &finer, &mount].concat()).assert().success();
+    assert_eq!(digest(&fine, &[]), digest(&other, &[]));
+    let again = map("again");
+    let from_kept = ["build", text(&kept), "-o", text(&again), "--poses", text(&new), "--resolution", "0.1"];
+    voxtile(&[&from_kept[..], &["--keep-scans", "--quiet"]].concat()).assert().success();
+    assert_eq!(digest(&again, &[]), digest(&wanted, &[]));
+    assert_eq!(digest(&again, &["--scans"]), digest(&wanted, &["--scans"]));
+    voxtile(&["verify", text(&kept)]).assert().success();
+    let metadata = fs::read_to_string(kept.join("metadata.json")).unwrap();
+    assert!(metadata.contains("\"version\": \"1.3\""), "{metadata}");
+}

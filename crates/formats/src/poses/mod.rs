@@ -4,7 +4,6 @@
 mod binary;
 mod calib;
 mod cells;
-mod deskew;
 mod direction;
 mod find_poses;
 mod g2o;
@@ -18,11 +17,11 @@ mod pose_source;
 mod posed_clouds;
 mod quaternion_order;
 mod rigid_pose;
+mod sweep_periods;
 mod text;
 mod time_unit;
 mod trajectory;
 
-pub use deskew::Deskew;
 pub(crate) use find_poses::{find_poses, pose_file_for};
 pub(crate) use gap::SAME_TIME_NS;
 pub use gap::most_gap_ns;
@@ -31,5 +30,6 @@ pub use pose_source::PoseSource;
 pub use posed_clouds::CloudOptions;
 pub(crate) use posed_clouds::{CloudPoses, PosedClouds};
 pub use rigid_pose::RigidPose;
+pub use sweep_periods::SweepPeriods;
 pub(crate) use text::{Rules, looks_like_poses};
 pub use trajectory::{Found, Trajectory};

@@ -1,12 +1,12 @@
 use super::pose_source::PoseSource;
-use super::{Found, Trajectory};
+use super::{Found, SweepPeriods, Trajectory};
 use crate::scans::Fingerprint;
 use crate::scans::PointStore;
 use crate::scans::{ScanHead, ScanSource};
-use crate::{CloudHead, CloudSource, Deskew, PoseAt, RigidPose};
-use std::cell::RefCell;
+use crate::{CloudHead, CloudPoint, CloudSource, PoseAt, RigidPose};
 use std::path::{Path, PathBuf};
-use voxtile::scan::{Pose, no_return};
+use std::sync::Arc;
+use voxtile::scan::{AttributeSet, NO_TIME, Pose, Sweep, no_return};
 use voxtile::space::Point;
 use voxtile::{Error, Result};
 
@@ -21,8 +21,8 @@ pub struct CloudOptions {
     pub body_from_sensor: RigidPose,
     /// Points are already in the world frame; poses only give the ray origins.
     pub is_world_frame: bool,
-    /// Applies motion compensation: moves each point to its position at the time of its cloud, using the point's own
-    /// time.
+    /// Applies motion compensation: points keep their own times, and the scan the motion of the sensor, by which each
+    /// point is moved to its place at the time of its cloud when it is mapped.
     pub is_deskewed: bool,
     /// A cloud without a pose is in the world frame. Only valid for points without rays.
     pub may_lack_poses: bool,
@@ -232,32 +232,18 @@ impl PosedClouds {
             // A rotation and its inverse would change the last bits of the points; the identity does not.
             world_from_sensor = Pose::from_quaternion(sensor.position_m, RigidPose::IDENTITY.quaternion)?;
         }
-        let Self { source, options, poses, .. } = self;
+        let Self { source, options, .. } = self;
         let stamp_ns = head.stamp_ns.filter(|_| options.is_deskewed && head.has_times);
-        let own = stamp_ns.and_then(|_| source.poses());
         self.without_times += u64::from(options.is_deskewed && stamp_ns.is_none());
-        let unreadable = RefCell::new(None);
-        let mut deskew = stamp_ns.map(|stamp_ns| {
-            let pose_at = |at_ns| match body_at(poses, own.as_ref(), options, at_ns) {
-                Ok(body) => Some(body?.then(&options.body_from_sensor)),
-                Err(error) => {
-                    unreadable.borrow_mut().get_or_insert(error);
-                    None
-                }
-            };
-            Deskew::new(stamp_ns, &sensor, pose_at)
-        });
-        points.begin_with(head.has_intensities, head.attributes);
-        let has_attributes = !head.attributes.is_none();
+        let mut periods = SweepPeriods::default();
+        let attributes = AttributeSet { times: stamp_ns.is_some(), ..head.attributes };
+        points.begin_with(head.has_intensities, attributes);
         let origin = if is_in_world { sensor.position_m } else { [0.0; 3] };
-        let read = source.read_points(&mut |point| {
+        source.read_points(&mut |point| {
             let position_m = point.position_m;
             let in_sensor: Point = if point.is_return || !options.has_no_returns {
-                let place = match point.is_return {
-                    true => deskew.as_mut().map_or(position_m, |deskew| deskew.apply(&point)),
-                    // Points at the position of the sensor are skipped when they are mapped.
-                    false => origin,
-                };
+                // Points at the position of the sensor are skipped when they are mapped.
+                let place = if point.is_return { position_m } else { origin };
                 if is_in_world { std::array::from_fn(|k| place[k] - origin[k]) } else { place }
             } else {
                 // A point without a return is kept if its direction is known.
@@ -266,18 +252,69 @@ impl PosedClouds {
                 let far = is_known.then(|| no_return([0.0; 3], direction)).flatten();
                 far.unwrap_or([f64::NAN; 3])
             };
-            if has_attributes {
-                return points.push_with(in_sensor, point.intensity, point.colour, point.class);
+            if attributes.is_none() {
+                return points.push(in_sensor, point.intensity);
             }
-            points.push(in_sensor, point.intensity)
-        });
-        self.stayed += deskew.map_or(0, |deskew| deskew.stayed());
-        read?;
-        if let Some(error) = unreadable.into_inner() {
-            return Err(error);
+            let time_ns = if attributes.times { time_after_stamp(&point) } else { NO_TIME };
+            periods.add(time_ns);
+            points.push_with(in_sensor, point.intensity, point.colour, point.class, time_ns)
+        })?;
+        if let Some(stamp_ns) = stamp_ns {
+            let sweep = self.sweep_of(&periods, stamp_ns, &sensor)?;
+            self.stayed += points_outside(points, &sweep)?;
+            points.set_sweep(Some(Arc::new(sweep)));
         }
         Ok(world_from_sensor)
     }
+
+    /// Returns the motion of the sensor during the current cloud.
+    fn sweep_of(&self, periods: &SweepPeriods, stamp_ns: i64, sensor: &RigidPose) -> Result<Sweep> {
+        let own = self.source.poses();
+        let mut unreadable = None;
+        let sweep = periods.sweep(stamp_ns, sensor, |at_ns| {
+            match body_at(&self.poses, own.as_ref(), &self.options, at_ns) {
+                Ok(body) => Some(body?.then(&self.options.body_from_sensor)),
+                Err(error) => {
+                    unreadable.get_or_insert(error);
+                    None
+                }
+            }
+        });
+        unreadable.map_or(sweep, Err)
+    }
+
+    /// Returns the pose of the sensor in the body frame, if it is another frame.
+    fn mount(&self) -> Option<[f64; 7]> {
+        let body_from_sensor = &self.options.body_from_sensor;
+        let ([x, y, z], [qx, qy, qz, qw]) = (body_from_sensor.position_m, body_from_sensor.quaternion);
+        (*body_from_sensor != RigidPose::IDENTITY).then_some([x, y, z, qx, qy, qz, qw])
+    }
+}
+
+/// Returns the time of a point after the stamp, in nanoseconds. Rays without a return stay as measured.
+fn time_after_stamp(point: &CloudPoint) -> i64 {
+    match point.is_return {
+        // The cast saturates; such times are outside all poses.
+        true if point.time_s.is_finite() => (point.time_s * 1e9).round() as i64,
+        true => i64::MAX,
+        false => NO_TIME,
+    }
+}
+
+/// Returns the number of points with a time at which the pose of the sensor is unknown.
+fn points_outside(points: &PointStore, sweep: &Sweep) -> Result<u64> {
+    let mut outside = 0;
+    let (mut last, mut is_covered) = (NO_TIME, true);
+    points.for_each_attributed_chunk(0..points.len(), &mut |_, _, attributes| {
+        for &time_ns in attributes.times_ns {
+            if time_ns != last {
+                (last, is_covered) = (time_ns, time_ns == NO_TIME || sweep.covers(time_ns));
+            }
+            outside += u64::from(!is_covered);
+        }
+        true
+    })?;
+    Ok(outside)
 }
 
 /// Returns the body pose at a time other than that of the current cloud.
@@ -337,7 +374,8 @@ impl ScanSource for PosedClouds {
             self.has_pose = true;
             let CloudHead { name, stamp_ns, fields, .. } = head;
             self.fields = fields;
-            return Ok(Some(ScanHead { name, stamp_ns, world_from_sensor }));
+            let body_from_sensor = self.mount();
+            return Ok(Some(ScanHead { name, stamp_ns, world_from_sensor, body_from_sensor }));
         }
         self.is_at_end = true;
         if self.without_pose > 0 && !self.has_pose && !self.options.may_lack_poses {

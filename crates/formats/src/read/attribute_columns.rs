@@ -49,7 +49,7 @@ impl AttributeColumns {
 
     /// Returns which attributes there are.
     pub(crate) fn set(&self) -> AttributeSet {
-        AttributeSet { colours: self.colour.is_some(), classes: self.class.is_some() }
+        AttributeSet { colours: self.colour.is_some(), classes: self.class.is_some(), ..AttributeSet::NONE }
     }
 
     /// Sets the attributes of a point, if there are any. `value` returns the value of a column, and `bits` that of a
@@ -245,7 +245,7 @@ pub(crate) fn packed_colour(bits: u32) -> [u8; 3] {
 mod tests {
     use super::*;
 
-    const BOTH: AttributeSet = AttributeSet { colours: true, classes: true };
+    const BOTH: AttributeSet = AttributeSet { colours: true, classes: true, ..AttributeSet::NONE };
 
     #[test]
     fn columns_are_found_by_common_names() {

@@ -83,7 +83,7 @@ impl CloudSource for DepthFrames {
         let colours = colours.map(|colours| ColourImage::open(&colours, &frame.path, (width, height)));
         let colours = colours.transpose()?;
         self.without_colours += u64::from(self.reads_colours && colours.is_none());
-        head.attributes = AttributeSet { colours: colours.is_some(), classes: false };
+        head.attributes = AttributeSet { colours: colours.is_some(), classes: false, ..AttributeSet::NONE };
         head.points = Some(u64::from(width) * u64::from(height));
         head.fields = vec!["depth".into()];
         self.current = Some((frame.path, colours));

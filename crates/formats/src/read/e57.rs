@@ -211,7 +211,11 @@ impl CloudSource for E57 {
             points: Some(scan.records),
             fields: scan.prototype.iter().map(|record| name_of(&record.name)).collect(),
             has_intensities: has_field(scan, &RecordName::Intensity),
-            attributes: AttributeSet { colours: self.reads_colours && has_colours(scan), classes: false },
+            attributes: AttributeSet {
+                colours: self.reads_colours && has_colours(scan),
+                classes: false,
+                ..AttributeSet::NONE
+            },
             ..one
         }))
     }

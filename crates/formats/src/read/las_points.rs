@@ -144,8 +144,8 @@ impl LasPoints {
 
     /// Returns which of the requested attributes the points have.
     pub(super) fn attributes(&self) -> AttributeSet {
-        let AttributeSet { colours, classes } = self.fields.attributes;
-        AttributeSet { colours: colours && self.fields.colours.are_there(), classes }
+        let AttributeSet { colours, classes, .. } = self.fields.attributes;
+        AttributeSet { colours: colours && self.fields.colours.are_there(), classes, ..AttributeSet::NONE }
     }
 
     /// Visits the points, except those marked as deleted ("withheld") and those that are not selected.

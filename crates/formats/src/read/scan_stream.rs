@@ -8,7 +8,7 @@ use crate::scans::{FLAG_CLASSES, FLAG_COLOURS, FLAG_INTENSITIES, MAGIC, MAX_LABE
 use crate::scans::{ScanHead, ScanSource};
 use std::io::{ErrorKind, Read};
 use std::path::{Path, PathBuf};
-use voxtile::scan::{AttributeSet, Pose};
+use voxtile::scan::{AttributeSet, NO_TIME, Pose};
 use voxtile::{Error, FormatError, Result};
 
 /// Reads voxtile's scan stream, as written by a [`ScanStreamWriter`](crate::ScanStreamWriter), scan by scan, from a
@@ -135,8 +135,11 @@ impl<R: StreamInput> ScanStream<R> {
             return Err(self.wrong(12, format!("flags {flags:#x} are unknown")));
         }
         self.has_intensities = flags & FLAG_INTENSITIES != 0;
-        self.attributes =
-            AttributeSet { colours: flags & FLAG_COLOURS != 0, classes: flags & FLAG_CLASSES != 0 };
+        self.attributes = AttributeSet {
+            colours: flags & FLAG_COLOURS != 0,
+            classes: flags & FLAG_CLASSES != 0,
+            ..AttributeSet::NONE
+        };
         let length = u32::from_le_bytes(self.bytes("the length of the label")?);
         if length > MAX_LABEL_BYTES {
             return Err(self
@@ -192,7 +195,7 @@ impl<R: StreamInput> ScanStream<R> {
     }
 
     fn point_bytes(&self) -> usize {
-        let AttributeSet { colours, classes } = self.attributes;
+        let AttributeSet { colours, classes, .. } = self.attributes;
         XYZ_BYTES
             + if self.has_intensities { INTENSITY_BYTES } else { 0 }
             + if colours { COLOUR_BYTES } else { 0 }
@@ -201,7 +204,7 @@ impl<R: StreamInput> ScanStream<R> {
 
     /// Adds the points of the chunk, which have attributes.
     fn push_attributed(&mut self, points: &mut PointStore) -> Result<()> {
-        let AttributeSet { colours, classes } = self.attributes;
+        let AttributeSet { colours, classes, .. } = self.attributes;
         for record in self.chunk.chunks_exact(self.point_bytes()) {
             let mut rest = record;
             let mut take = |count: usize| {
@@ -221,7 +224,7 @@ impl<R: StreamInput> ScanStream<R> {
                 _ => None,
             };
             if self.classes.takes(class) {
-                points.push_with(point, intensity, colour, class)?;
+                points.push_with(point, intensity, colour, class, NO_TIME)?;
             } else {
                 self.left_out += 1;
             }
@@ -300,9 +303,12 @@ impl<R: StreamInput> ScanSource for ScanStream<R> {
         let Some(Head { count, pose_at, pose }) = self.next_head()? else { return Ok(None) };
         self.is_past_error = false;
         let count = count as usize;
-        let AttributeSet { colours, classes } = self.attributes;
-        let is_wanted =
-            AttributeSet { colours: colours && self.wanted.colours, classes: classes && self.wanted.classes };
+        let AttributeSet { colours, classes, .. } = self.attributes;
+        let is_wanted = AttributeSet {
+            colours: colours && self.wanted.colours,
+            classes: classes && self.wanted.classes,
+            ..AttributeSet::NONE
+        };
         points.begin_with(self.has_intensities, is_wanted);
         points.reserve(count.min(MAX_RESERVED));
         let mut left = count;
@@ -330,7 +336,7 @@ impl<R: StreamInput> ScanSource for ScanStream<R> {
         let pose = self.pose(pose, pose_at);
         self.is_past_error = pose.is_err();
         let world_from_sensor = pose?;
-        Ok(Some(ScanHead { name, stamp_ns: None, world_from_sensor }))
+        Ok(Some(ScanHead { name, stamp_ns: None, world_from_sensor, body_from_sensor: None }))
     }
 
     fn remarks(&self) -> Vec<String> {

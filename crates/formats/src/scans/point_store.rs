@@ -1,12 +1,14 @@
 use std::io;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
-use voxtile::scan::{AttributeSet, MovingMarks, PointAttributes, TakeAttributed, TakePoints};
+use std::sync::Arc;
+use voxtile::scan::{AttributeSet, MovingMarks, NO_TIME, PointAttributes, Sweep, TakeAttributed, TakePoints};
 use voxtile::space::Point;
 use voxtile::{Error, Result};
 use voxtile_scratch::{ScratchFile, Window};
 
-/// Points of one scan in the sensor frame, in metres: in memory up to a limit, the others in a temporary file.
+/// Points of one scan in the sensor frame, in metres: in memory up to a limit, the others in a temporary file. If they
+/// have times, each is in the sensor frame at its own time.
 ///
 /// The file has no name and is freed when the store is dropped.
 #[derive(Debug)]
@@ -21,6 +23,8 @@ pub struct PointStore {
     budget: PointBudget,
     /// Marks of moving points, if the source has any.
     moving: Option<Box<MovingMarks>>,
+    /// Motion of the sensor, if points have times.
+    sweep: Option<Arc<Sweep>>,
 }
 
 /// Attributes of the points in memory. They are in a box, because most scans have none.
@@ -43,8 +47,10 @@ pub struct PointBudget {
 /// Size of a point in the file without attributes: the point and its intensity (0 if there is none), in native byte
 /// order, because no other process reads the file.
 const RECORD_BYTES: usize = size_of::<Point>() + size_of::<f32>();
-/// Size of a colour in the file: whether there is one, red, green and blue. It follows the intensity.
+/// Size of a colour in the file: whether there is one, red, green and blue.
 const COLOUR_BYTES: usize = 4;
+/// Size of the time in the file, in nanoseconds. It follows the intensity.
+const TIME_BYTES: usize = size_of::<i64>();
 /// Size of a class in the file: whether there is one, and the class. It is last.
 const CLASS_BYTES: usize = 2;
 /// Number of points to read at once.
@@ -94,8 +100,8 @@ impl PointStore {
     pub fn new(budget: PointBudget) -> Self {
         let (set, lists) = Default::default();
         let attributes = StoredAttributes { set, lists, max_points: budget.max_points(RECORD_BYTES) };
-        let (points, intensities, filed, file, moving) = Default::default();
-        Self { points, intensities, attributes: Box::new(attributes), filed, file, budget, moving }
+        let (points, intensities, filed, file, moving, sweep) = Default::default();
+        Self { points, intensities, attributes: Box::new(attributes), filed, file, budget, moving, sweep }
     }
 
     /// Removes all points and sets whether the next ones have intensities. They have no attributes.
@@ -110,7 +116,7 @@ impl PointStore {
         self.attributes.lists.clear();
         self.attributes.set = attributes;
         self.attributes.max_points = self.budget.max_points(self.record_bytes());
-        (self.filed, self.file, self.moving) = (0, None, None);
+        (self.filed, self.file, self.moving, self.sweep) = (0, None, None, None);
     }
 
     /// Sets the marks of all points, after the last point.
@@ -121,6 +127,16 @@ impl PointStore {
     /// Returns the marks of the points that hit something that was moving, if the source has any.
     pub fn moving(&self) -> Option<&MovingMarks> {
         self.moving.as_deref()
+    }
+
+    /// Sets the motion of the sensor, after the last point, for points with times.
+    pub fn set_sweep(&mut self, sweep: Option<Arc<Sweep>>) {
+        self.sweep = sweep;
+    }
+
+    /// Returns the motion of the sensor, if points have times.
+    pub fn sweep(&self) -> Option<&Arc<Sweep>> {
+        self.sweep.as_ref()
     }
 
     pub(crate) fn budget(&self) -> &PointBudget {
@@ -144,7 +160,7 @@ impl PointStore {
     #[inline]
     pub fn push(&mut self, point: Point, intensity: f32) -> Result<()> {
         if !self.attributes.set.is_none() {
-            return self.push_with(point, intensity, None, None);
+            return self.push_with(point, intensity, None, None, NO_TIME);
         }
         if self.points.len() == self.attributes.max_points {
             self.put_in_file()?;
@@ -167,6 +183,7 @@ impl PointStore {
         intensity: f32,
         colour: Option<[u8; 3]>,
         class: Option<u8>,
+        time_ns: i64,
     ) -> Result<()> {
         if self.points.len() == self.attributes.max_points {
             self.put_in_file()?;
@@ -180,6 +197,9 @@ impl PointStore {
         }
         if self.attributes.set.classes {
             self.attributes.lists.classes.push(class);
+        }
+        if self.attributes.set.times {
+            self.attributes.lists.times_ns.push(time_ns);
         }
         Ok(())
     }
@@ -220,6 +240,9 @@ impl PointStore {
                 let intensity = self.intensities.as_ref().map_or(0.0, |intensities| intensities[number]);
                 bytes.extend_from_slice(bytemuck::bytes_of(point));
                 bytes.extend_from_slice(bytemuck::bytes_of(&intensity));
+                if let Some(time_ns) = self.attributes.lists.times_ns.get(number) {
+                    bytes.extend_from_slice(bytemuck::bytes_of(time_ns));
+                }
                 if let Some(colour) = self.attributes.lists.colours.get(number) {
                     let [red, green, blue] = colour.unwrap_or_default();
                     bytes.extend([u8::from(colour.is_some()), red, green, blue]);
@@ -242,8 +265,9 @@ impl PointStore {
 
     /// Returns the size of a point in the file.
     fn record_bytes(&self) -> usize {
-        let AttributeSet { colours, classes } = self.attributes.set;
-        RECORD_BYTES + COLOUR_BYTES * usize::from(colours) + CLASS_BYTES * usize::from(classes)
+        let AttributeSet { colours, classes, times } = self.attributes.set;
+        let sizes = [(colours, COLOUR_BYTES), (classes, CLASS_BYTES), (times, TIME_BYTES)];
+        RECORD_BYTES + sizes.iter().map(|(is_there, bytes)| if *is_there { *bytes } else { 0 }).sum::<usize>()
     }
 
     /// Returns the number of points.
@@ -267,7 +291,7 @@ impl PointStore {
     }
 
     /// Passes the points of a range to `take` in order, chunk by chunk, with their intensities if there are any. `take`
-    /// returns whether to continue.
+    /// returns whether to continue. Points with times are in the sensor frame at their own times.
     ///
     /// # Errors
     ///
@@ -321,9 +345,18 @@ impl PointStore {
         })
     }
 
-    /// Returns points, intensities and attributes, if all are in memory.
+    /// Returns points in the sensor frame at the stamp, intensities and attributes without times, if all are in memory.
     pub(crate) fn into_parts(self) -> (Vec<Point>, Option<Vec<f32>>, PointAttributes) {
-        (self.points, self.intensities, self.attributes.lists)
+        let Self { mut points, intensities, attributes, sweep, .. } = self;
+        let mut attributes = attributes.lists;
+        if let Some(sweep) = sweep {
+            let mut to_stamp = sweep.to_stamp();
+            for (point, time_ns) in points.iter_mut().zip(&attributes.times_ns) {
+                *point = to_stamp.apply(*point, *time_ns);
+            }
+        }
+        attributes.times_ns = Vec::new();
+        (points, intensities, attributes)
     }
 }
 
@@ -346,6 +379,10 @@ impl FileChunk {
             let (intensity, mut rest) = rest.split_at(size_of::<f32>());
             self.points.push(bytemuck::pod_read_unaligned::<Point>(point));
             self.intensities.push(bytemuck::pod_read_unaligned::<f32>(intensity));
+            if let (true, Some((time_ns, others))) = (set.times, rest.split_first_chunk()) {
+                self.attributes.times_ns.push(i64::from_ne_bytes(*time_ns));
+                rest = others;
+            }
             if let (true, [is_there, red, green, blue, class @ ..]) = (set.colours, rest) {
                 self.attributes.colours.push((*is_there != 0).then_some([*red, *green, *blue]));
                 rest = class;
@@ -410,19 +447,21 @@ mod tests {
         let count = 3 * POINTS_AT_A_TIME + 77;
         let colour = |k: usize| (!k.is_multiple_of(3)).then_some([k as u8, (k / 7) as u8, (k / 256) as u8]);
         let class = |k: usize| (!k.is_multiple_of(5)).then_some((k % 251) as u8);
-        for (colours, classes) in [(true, true), (true, false), (false, true), (false, false)] {
-            let set = AttributeSet { colours, classes };
+        let time = |k: usize| if k.is_multiple_of(7) { NO_TIME } else { 55_296 * k as i64 - 1_000_000 };
+        for case in 0..8 {
+            let [colours, classes, times] = [1, 2, 4].map(|bit| case & bit != 0);
+            let set = AttributeSet { colours, classes, times };
             for max_bytes in [0, 1 << 20, usize::MAX] {
                 let mut store = PointStore::new(PointBudget::new(max_bytes, folder.path()));
                 store.begin(true);
                 store.push([1.0; 3], 1.0).unwrap();
                 store.begin_with(true, set);
                 for k in 0..count {
-                    store.push_with([k as f64; 3], k as f32, colour(k), class(k)).unwrap();
+                    store.push_with([k as f64; 3], k as f32, colour(k), class(k), time(k)).unwrap();
                 }
                 assert_eq!((store.len(), store.attributes()), (count, set));
                 assert_eq!(store.file.is_some(), max_bytes < usize::MAX);
-                assert!(store.record_bytes() <= RECORD_BYTES + 6);
+                assert!(store.record_bytes() <= RECORD_BYTES + 14);
                 for range in [0..count, POINTS_AT_A_TIME - 1..2 * POINTS_AT_A_TIME + 1, count - 1..count] {
                     let mut next = range.start;
                     let mut take = |points: &[Point], _: Option<&[f32]>, attributes: AttributeSlices<'_>| {
@@ -430,6 +469,7 @@ mod tests {
                             assert_eq!(point[0], next as f64);
                             assert_eq!(attributes.colour(at), colour(next).filter(|_| colours));
                             assert_eq!(attributes.class(at), class(next).filter(|_| classes));
+                            assert_eq!(attributes.time_ns(at), if times { time(next) } else { NO_TIME });
                             next += 1;
                         }
                         assert!(attributes.colours.len() == points.len() || !colours);

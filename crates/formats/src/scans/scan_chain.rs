@@ -1,6 +1,6 @@
 use super::stored_scan::StoredScan;
 use voxtile::Result;
-use voxtile::scan::{AttributeSet, AttributeSlices, Pose};
+use voxtile::scan::{AttributeSet, AttributeSlices, Pose, Sweep};
 
 /// Fingerprint of a scan: a hash of its points, intensities and attributes, and another of its pose. It does not depend on storage
 /// format and file name.
@@ -65,7 +65,7 @@ impl ScanFingerprint {
         }
         Ok(Self {
             scan: fingerprint(&hasher),
-            pose: pose_fingerprint(world_from_sensor),
+            pose: pose_fingerprint(world_from_sensor, store.sweep().map(|sweep| &**sweep)),
             has_points: !store.is_empty(),
         })
     }
@@ -136,11 +136,15 @@ impl ScanChain {
 /// Hashes which attributes points have.
 pub(super) fn hash_set(hasher: &mut blake3::Hasher, set: AttributeSet) {
     hasher.update(&[u8::from(set.colours), u8::from(set.classes)]);
+    if set.times {
+        hasher.update(&[1]);
+    }
 }
 
 /// Hashes attributes point by point, so that the result does not depend on the size of chunks.
 pub(super) fn hash_attributes(hasher: &mut blake3::Hasher, attributes: AttributeSlices<'_>) {
-    let points = attributes.colours.len().max(attributes.classes.len());
+    let AttributeSlices { colours, classes, times_ns } = attributes;
+    let points = colours.len().max(classes.len()).max(times_ns.len());
     let mut bytes = Vec::new();
     for first in (0..points).step_by(POINTS_AT_A_TIME) {
         bytes.clear();
@@ -149,6 +153,7 @@ pub(super) fn hash_attributes(hasher: &mut blake3::Hasher, attributes: Attribute
             let [red, green, blue] = colour.unwrap_or_default();
             bytes.extend([u8::from(colour.is_some()), red, green, blue]);
             bytes.extend([u8::from(class.is_some()), class.unwrap_or_default()]);
+            bytes.extend(times_ns.get(number).into_iter().flat_map(|time| time.to_le_bytes()));
         }
         hasher.update(&bytes);
     }
@@ -164,10 +169,15 @@ fn fingerprint(hasher: &blake3::Hasher) -> [u8; FINGERPRINT_BYTES] {
     fingerprint
 }
 
-fn pose_fingerprint(pose: &Pose) -> [u8; FINGERPRINT_BYTES] {
+fn pose_fingerprint(pose: &Pose, sweep: Option<&Sweep>) -> [u8; FINGERPRINT_BYTES] {
     let mut hasher = hasher("voxtile 1 pose");
     for number in pose.position_m().into_iter().chain(pose.quaternion()) {
         hasher.update(&bits(number).to_le_bytes());
+    }
+    if let Some(sweep) = sweep {
+        let mut bytes = Vec::new();
+        sweep.write(&mut bytes);
+        hasher.update(&bytes);
     }
     fingerprint(&hasher)
 }
@@ -207,6 +217,7 @@ mod tests {
             stamp_ns: None,
             points_in_sensor,
             world_from_sensor: Isometry3::translation(x_m, 0.0, 0.0).into(),
+            body_from_sensor: None,
         }
     }
 
@@ -251,8 +262,11 @@ mod tests {
 
         let painted = |colour: Option<[u8; 3]>, class: Option<u8>| {
             let mut scan = scan(&[], None, 0.0);
-            scan.points_in_sensor.begin_with(false, AttributeSet { colours: true, classes: true });
-            scan.points_in_sensor.push_with(first_points[0], 0.0, colour, class).unwrap();
+            scan.points_in_sensor
+                .begin_with(false, AttributeSet { colours: true, classes: true, ..AttributeSet::NONE });
+            scan.points_in_sensor
+                .push_with(first_points[0], 0.0, colour, class, voxtile::scan::NO_TIME)
+                .unwrap();
             fingerprint_of(&scan).scan_text()
         };
         let mut painted = [

@@ -167,7 +167,8 @@ impl SelectedScans {
                     if is_taken {
                         let intensity = intensities.map_or(0.0, |intensities| intensities[number]);
                         let (colour, class) = (attributes.colour(number), attributes.class(number));
-                        outcome = points.push_with(point, intensity, colour, class);
+                        let time_ns = attributes.time_ns(number);
+                        outcome = points.push_with(point, intensity, colour, class, time_ns);
                         if outcome.is_err() {
                             return false;
                         }
@@ -177,6 +178,7 @@ impl SelectedScans {
             },
         )?;
         points.set_moving(marks.map(|(_, taken)| taken.finish()));
+        points.set_sweep(self.unfiltered.sweep().cloned());
         self.unfiltered = PointStore::default();
         outcome?;
         Ok(head)

@@ -1,7 +1,9 @@
 use super::point_store::PointStore;
 use std::ops::Range;
 use voxtile::Result;
-use voxtile::scan::{AttributeSet, MovingMarks, PointFrame, Pose, ScanPoints, TakeAttributed, TakePoints};
+use voxtile::scan::{
+    AttributeSet, MovingMarks, PointFrame, Pose, ScanPoints, Sweep, TakeAttributed, TakePoints,
+};
 use voxtile::space::Point;
 
 /// Scan of any size in the sensor frame, with the sensor's pose.
@@ -13,10 +15,13 @@ pub struct StoredScan {
     pub name: String,
     /// Time stamp, in nanoseconds since the epoch of the source, if known.
     pub stamp_ns: Option<i64>,
-    /// End points in the sensor frame, in metres.
+    /// End points in the sensor frame, in metres; in that at their own times, if they have times.
     pub points_in_sensor: PointStore,
     /// Pose of the sensor: `world = R * p + t`.
     pub world_from_sensor: Pose,
+    /// Pose of the sensor in the body frame that the trajectory describes, if it is another frame: position in metres, then
+    /// quaternion x, y, z, w.
+    pub body_from_sensor: Option<[f64; 7]>,
 }
 
 impl ScanPoints for StoredScan {
@@ -50,14 +55,24 @@ impl ScanPoints for StoredScan {
         frame: PointFrame,
         take: &mut TakeAttributed<'_>,
     ) -> Result<()> {
-        if frame == PointFrame::Own {
+        let to_world = (frame == PointFrame::World).then(|| self.world_from_sensor.to_world());
+        let mut to_stamp = self.sweep().filter(|_| frame != PointFrame::Raw).map(Sweep::to_stamp);
+        if to_world.is_none() && to_stamp.is_none() {
             return self.points_in_sensor.for_each_attributed_chunk(range, take);
         }
-        let (to_world, mut in_world) = (self.world_from_sensor.to_world(), Vec::new());
+        let mut moved = Vec::new();
         self.points_in_sensor.for_each_attributed_chunk(range, &mut |points, intensities, attributes| {
-            in_world.clear();
-            in_world.extend(points.iter().copied().map(to_world));
-            take(&in_world, intensities, attributes)
+            moved.clear();
+            moved.extend_from_slice(points);
+            if let Some(to_stamp) = &mut to_stamp {
+                for (point, time_ns) in moved.iter_mut().zip(attributes.times_ns) {
+                    *point = to_stamp.apply(*point, *time_ns);
+                }
+            }
+            if let Some(to_world) = &to_world {
+                moved.iter_mut().for_each(|point| *point = to_world(*point));
+            }
+            take(&moved, intensities, attributes)
         })
     }
 
@@ -72,6 +87,16 @@ impl ScanPoints for StoredScan {
     }
 
     fn for_each_own_chunk(&self, range: Range<usize>, take: &mut TakePoints<'_>) -> Result<()> {
-        self.points_in_sensor.for_each_chunk(range, take)
+        self.for_each_attributed_chunk(range, PointFrame::Own, &mut |points, intensities, _| {
+            take(points, intensities)
+        })
+    }
+
+    fn sweep(&self) -> Option<&Sweep> {
+        self.points_in_sensor.sweep().map(|sweep| &**sweep)
+    }
+
+    fn body_from_sensor(&self) -> Option<[f64; 7]> {
+        self.body_from_sensor
     }
 }

@@ -86,7 +86,7 @@ fn clouds(data: &[u8], name: &str, format: &str, scan_period_s: f64) -> bool {
         format: Some(format.to_owned()),
         scan_period_s,
         memory_bytes: 1 << 16,
-        attributes: AttributeSet { colours: true, classes: true },
+        attributes: AttributeSet { colours: true, classes: true, ..AttributeSet::NONE },
         ..ReadOptions::default()
     };
     with_file(name, data, |path| {

@@ -9,7 +9,7 @@ use voxtile_formats::{
 /// A point with its attributes.
 pub type Row = ([f64; 3], Option<[u8; 3]>, Option<u8>);
 
-pub const BOTH: AttributeSet = AttributeSet { colours: true, classes: true };
+pub const BOTH: AttributeSet = AttributeSet { colours: true, classes: true, ..AttributeSet::NONE };
 
 /// More points than are in memory or in a chunk of the file.
 const ROWS: usize = 17_000;
@@ -357,6 +357,7 @@ fn scan_streams_carry_attributes() {
         attributes: PointAttributes {
             colours: rows.iter().map(|row| row.1).collect(),
             classes: rows.iter().map(|row| row.2).collect(),
+            ..PointAttributes::default()
         },
         world_from_sensor: pose,
     };
@@ -364,7 +365,7 @@ fn scan_streams_carry_attributes() {
         let intensities = has_intensities.then(|| vec![0.25; ROWS]);
         let scan = SensorScan { intensities, ..scan.clone() };
         for (colours, classes) in [(true, true), (true, false), (false, true)] {
-            let set = AttributeSet { colours, classes };
+            let set = AttributeSet { colours, classes, ..AttributeSet::NONE };
             let mut bytes = Vec::new();
             let mut writer =
                 ScanStreamWriter::with_attributes(&mut bytes, "a", has_intensities, set).unwrap();

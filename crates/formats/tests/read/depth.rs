@@ -183,7 +183,7 @@ fn colour_image(path: &Path, width: u32, color: png::ColorType, bytes: &[u8]) {
 fn with_colours() -> ReadOptions {
     ReadOptions {
         intrinsics: Some(Intrinsics::new([525.0, 525.0, 319.5, 239.5]).unwrap()),
-        attributes: AttributeSet { colours: true, classes: false },
+        attributes: AttributeSet { colours: true, classes: false, ..AttributeSet::NONE },
         ..Default::default()
     }
 }

@@ -2,8 +2,9 @@ use crate::support::clouds;
 use std::fmt::Write as _;
 use std::fs;
 use std::path::Path;
+use voxtile::scan::Sweep;
 use voxtile_formats::poses::{Found, Trajectory};
-use voxtile_formats::{CloudPoint, Deskew, RigidPose};
+use voxtile_formats::{CloudPoint, RigidPose, SweepPeriods};
 
 /// Start of the sweep: the stamp of the cloud.
 const STAMP_NS: i64 = 1_700_000_000_250_000_000;
@@ -60,12 +61,27 @@ fn worst_m(points: &[CloudPoint], mut place: impl FnMut(&CloudPoint) -> [f64; 3]
     points.iter().map(|point| plane_distance_m(sensor.apply(place(point)))).fold(0.0, f64::max)
 }
 
+/// Returns the time of a point after the stamp.
+fn after_ns(point: &CloudPoint) -> i64 {
+    (point.time_s * 1e9).round() as i64
+}
+
+/// Returns the motion of the sensor during these points.
+fn sweep_of(points: &[CloudPoint], pose_at: impl FnMut(i64) -> Option<RigidPose>) -> Sweep {
+    let mut periods = SweepPeriods::default();
+    points.iter().for_each(|point| periods.add(after_ns(point)));
+    periods.sweep(STAMP_NS, &world_from_sensor(0.0), pose_at).unwrap()
+}
+
 fn assert_deskews(points: &[CloudPoint], pose_at: impl FnMut(i64) -> Option<RigidPose>, of: &str) {
     assert_eq!(points.len(), POINTS, "{of}");
-    let mut deskew = Deskew::new(STAMP_NS, &world_from_sensor(0.0), pose_at);
-    let (skewed_m, deskewed_m) =
-        (worst_m(points, |point| point.position_m), worst_m(points, |point| deskew.apply(point)));
-    assert_eq!(deskew.stayed(), 0, "{of}");
+    let sweep = sweep_of(points, pose_at);
+    let mut to_stamp = sweep.to_stamp();
+    let (skewed_m, deskewed_m) = (
+        worst_m(points, |point| point.position_m),
+        worst_m(points, |point| to_stamp.apply(point.position_m, after_ns(point))),
+    );
+    assert!(points.iter().all(|point| sweep.covers(after_ns(point))), "{of}");
     assert!(skewed_m > 0.3, "{of}: without deskewing, points are only {skewed_m} m off");
     assert!(deskewed_m < 2e-5, "{of}: {deskewed_m} m off");
 }
@@ -159,17 +175,24 @@ fn points_far_from_the_stamp_move_and_those_without_a_pose_are_counted() {
     let last_ns = STAMP_NS + 2_000_500_000;
     let pose_at =
         |at_ns: i64| (at_ns <= last_ns).then(|| world_from_sensor((at_ns - STAMP_NS) as f64 * 1e-9));
-    let mut deskew = Deskew::new(STAMP_NS, &world_from_sensor(0.0), pose_at);
-    let mut place = |time_s: f64| deskew.apply(&CloudPoint { time_s, ..CloudPoint::hit([3.0, 1.0, 0.0]) });
-    for time_s in [-5.0, -0.301, 0.4, 1.7, 2.0, 2.000_25] {
+    let known_s = [-5.0, -0.301, 0.4, 1.7, 2.0, 2.000_25];
+    let unknown_s = [2.000_75, 9.0, 1e300, -1e300];
+    let point = |time_s: f64| CloudPoint { time_s, ..CloudPoint::hit([3.0, 1.0, 0.0]) };
+    let points: Vec<_> = known_s.iter().chain(&unknown_s).map(|time_s| point(*time_s)).collect();
+    let sweep = sweep_of(&points, pose_at);
+    let place = |time_s: f64| sweep.to_stamp().apply([3.0, 1.0, 0.0], after_ns(&point(time_s)));
+    for time_s in known_s {
         let wanted = world_from_sensor(time_s).apply([3.0, 1.0, 0.0]);
         let found = place(time_s);
         assert!((0..3).all(|k| (found[k] - wanted[k]).abs() < 1e-5), "{time_s} s: {found:?}, not {wanted:?}");
     }
-    for time_s in [2.000_75, 9.0, 1e300, -1e300] {
+    for time_s in unknown_s {
         assert_eq!(place(time_s), [3.0, 1.0, 0.0], "{time_s} s");
+        assert!(!sweep.covers(after_ns(&point(time_s))));
     }
-    assert_eq!(deskew.stayed(), 3 + 1);
+    // Other poses at the same times.
+    let again = SweepPeriods::of(&sweep).sweep(STAMP_NS, &world_from_sensor(0.0), pose_at).unwrap();
+    assert_eq!(again, sweep);
 }
 
 #[cfg(feature = "ros")]

@@ -6,7 +6,7 @@ use voxtile_formats::ros::{BagOptions, PoseSource};
 
 const U8: u8 = 2;
 const U16: u8 = 4;
-const BOTH: AttributeSet = AttributeSet { colours: true, classes: true };
+const BOTH: AttributeSet = AttributeSet { colours: true, classes: true, ..AttributeSet::NONE };
 
 /// Reads clouds with these fields after x, y and z.
 fn read_clouds(

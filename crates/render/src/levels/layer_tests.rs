@@ -25,6 +25,7 @@ fn map_of(edge: i32, hits: &[Hit]) -> InMemoryMapper {
         let attributes = PointAttributes {
             colours: of_scan.iter().map(|hit| hit.1).collect(),
             classes: of_scan.iter().map(|hit| hit.2).collect(),
+            ..PointAttributes::default()
         };
         let points = ScanRef::in_world([0.0, 0.0, 500.0], &points).with_intensities(&intensities).unwrap();
         let points = points.with_attributes(&attributes).unwrap();

@@ -129,7 +129,7 @@ mod tests {
         let extent = Extent { radius_m: 50.0, heights_m: [f64::NEG_INFINITY, f64::INFINITY] };
         let points = [[2.05, 0.05, 0.05], [2.06, 0.06, 0.05], [31.05, 0.05, 0.05], [0.05, 5.05, 0.05]];
         let colours = vec![Some([10, 20, 30]), Some([20, 30, 50]), Some([255, 0, 1]), None];
-        let attributes = PointAttributes { colours, classes: Vec::new() };
+        let attributes = PointAttributes { colours, classes: Vec::new(), ..PointAttributes::default() };
         let scan = ScanRef::in_world([0.05; 3], &points).with_attributes(&attributes).unwrap();
         let make = |name: &str, layers: &str| {
             let config = MapConfig::new(0.1, 10.0).unwrap().with_layers(layers.parse::<Layers>().unwrap());

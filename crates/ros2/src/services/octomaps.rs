@@ -112,7 +112,11 @@ mod tests {
         let layers: Layers = "colour".parse().unwrap();
         let config = MapConfig::new(0.1, 10.0).unwrap().with_layers(layers);
         let mut mapper = OutOfCoreTileMapper::create(folder.path().join("map"), config).unwrap();
-        let attributes = PointAttributes { colours: vec![Some([1, 2, 3])], classes: Vec::new() };
+        let attributes = PointAttributes {
+            colours: vec![Some([1, 2, 3])],
+            classes: Vec::new(),
+            ..PointAttributes::default()
+        };
         let points = [[2.05, 0.05, 0.05]];
         let scan = ScanRef::in_world([0.05; 3], &points).with_attributes(&attributes).unwrap();
         mapper.insert_points(&scan).unwrap();
