@@ -55,11 +55,12 @@ export class Layer {
         group.userData.mesh = mesh;
         return group;
       },
-      calculateBytesUsed: (tile, scene) => {
-        const mesh = scene?.userData.mesh;
-        return mesh ? bytesOf(mesh.userData.node, mesh.userData.faces) : 0;
-      },
     });
+    // The renderer's own estimate would count shared indices in each mesh, and no voxels for picking.
+    tiles.calculateBytesUsed = (tile, scene) => {
+      const mesh = scene?.userData.mesh;
+      return mesh ? bytesOf(mesh.userData.node, mesh.userData.faces) : 0;
+    };
     tiles.setCamera(this.viewer.camera);
     tiles.setResolutionFromRenderer(this.viewer.camera, this.viewer.renderer);
     tiles.lost = new Set();
@@ -77,7 +78,7 @@ export class Layer {
 
   // Loads the voxels with the values of another layer, or with another legend.
   paintBy(legend) {
-    const coloursOf = (one) => JSON.stringify(one && [one.range, one.classes.map((each) => each.class)]);
+    const coloursOf = (one) => JSON.stringify(one && one.classes.map((each) => each.class));
     const isSame = coloursOf(this.legend) === coloursOf(legend);
     this.legend = legend;
     const { layerName } = this.next ?? this.tiles;
