@@ -54,6 +54,12 @@ let maps = [];
 let tool = 'query';
 let marks = [];
 let answered = null;
+// Place of the last click on the screen.
+let clickedAt = [0, 0];
+// Earlier views, and when the last one was left.
+const views = [];
+let leftAt = 0;
+let playTimer = 0;
 // Ends of the colours that the user chose, by what is coloured.
 const chosen = new Map();
 // Legend of the layer by which voxels are coloured, and the number of the last request for it.
@@ -78,6 +84,7 @@ const COLOURS = [['height', 'height'], ['probability', 'probability'], ['count',
   ['rgb', 'colour'], ['intensity', 'intensity'], ['class', 'class'], ['age', 'last hit']];
 // Sliders of the cut, and their positions without a cut.
 const CUTS = ['x0', 'x1', 'y0', 'y1', 'z0', 'z1'];
+const MOST_VIEWS = 50;
 const OPEN = ['0', '1000', '0', '1000', '0', '1000'];
 
 // The page lists the snapshots of the first map. A map without a snapshot of the chosen name is shown in its current
@@ -108,6 +115,14 @@ function answer(rows) {
     dd.append(value);
     return [dt, dd];
   }));
+  $('card').hidden = rows.length === 0;
+  if (!rows.length) return;
+  // The card is next to the click, within the picture.
+  const { left, top, width, height } = $('scene').getBoundingClientRect();
+  const within = (at, size, low, space) => Math.max(Math.min(at > low + space - size - 16 ? at - size - 14 : at + 14, low + space - size - 8), low + 8);
+  const { offsetWidth, offsetHeight } = $('card');
+  $('card').style.left = `${within(clickedAt[0], offsetWidth, left, width)}px`;
+  $('card').style.top = `${within(clickedAt[1], offsetHeight, top, height)}px`;
 }
 
 // --- Maps
@@ -458,7 +473,9 @@ function paint() {
   viewer.range = range;
   viewer.heights = viewer.colour === 'height' ? range : heightsOf().range;
   const wide = Math.max(domain[1] - domain[0], 1e-9);
-  ['range-low', 'range-high'].forEach((id, k) => { $(id).value = Math.round(1000 * (range[k] - domain[0]) / wide); });
+  const shares = range.map((value) => (value - domain[0]) / wide);
+  ['range-low', 'range-high'].forEach((id, k) => { $(id).value = Math.round(1000 * shares[k]); });
+  drawLegend($('legend'), ...shares);
   const ends = BY_LAYER[viewer.colour] ? paintLegend(range) : texts(range);
   if (isChange || !BY_LAYER[viewer.colour]) $('legend-classes').hidden = true;
   $('legend').hidden = isChange || ['rgb', 'class'].includes(viewer.colour);
@@ -812,9 +829,9 @@ $('compared').addEventListener('change', async () => {
 });
 for (const one of ['query', 'measure', 'sight']) $(`tool-${one}`).addEventListener('click', () => choose(one));
 $('copy').addEventListener('click', () => navigator.clipboard?.writeText(answered.voxel_center_m.join(' ')).catch((error) => say(error.message)));
-$('fit').addEventListener('click', () => viewer.frameMost(oblique()));
-$('top').addEventListener('click', () => viewer.frameMost([0, -0.001, 1]));
-$('side').addEventListener('click', () => viewer.frameMost([0, -1, 0.05]));
+$('fit').addEventListener('click', () => keepView() || viewer.frameMost(oblique()));
+$('top').addEventListener('click', () => keepView() || viewer.frameMost([0, -0.001, 1]));
+$('side').addEventListener('click', () => keepView() || viewer.frameMost([0, -1, 0.05]));
 $('walk').addEventListener('click', () => {
   viewer.flight.walk(!viewer.flight.walks);
   $('walk').setAttribute('aria-pressed', String(viewer.flight.walks));
@@ -827,6 +844,48 @@ $('shot').addEventListener('click', () => {
     a.click();
     setTimeout(() => URL.revokeObjectURL(a.href), 1000);
   });
+});
+// Remembers the present view for `Back`. The steps of a wheel are one change.
+function keepView() {
+  const now = performance.now();
+  if (now - leftAt > 500) views.push([viewer.camera.position, viewer.flight.orbit.target].map((at) => viewer.toMap(at.toArray())));
+  leftAt = now;
+  if (views.length > MOST_VIEWS) views.shift();
+  $('back').disabled = false;
+}
+
+$('back').addEventListener('click', () => {
+  const view = views.pop();
+  $('back').disabled = views.length === 0;
+  leftAt = 0;
+  if (view) viewer.flight.lookAt(...view.map((at) => viewer.toScene(at)));
+});
+$('card-close').addEventListener('click', () => choose(tool));
+
+// Moves the sensor along the trajectory in ten seconds or more.
+function play(isOn) {
+  clearInterval(playTimer);
+  playTimer = 0;
+  $('play').setAttribute('aria-pressed', String(isOn));
+  if (!isOn) return;
+  const last = Number($('scan').max);
+  if (Number($('scan').value) === last) $('scan').value = 0;
+  const step = Math.max(Math.round(last / 100), 1);
+  playTimer = setInterval(() => {
+    $('scan').value = Math.min(Number($('scan').value) + step, last);
+    showScan();
+    if (Number($('scan').value) >= last) play(false);
+  }, 100);
+}
+$('play').addEventListener('click', () => play(!playTimer));
+
+// Copies the command that crops the map to the cut.
+$('crop').addEventListener('click', () => {
+  const bounds = allBounds();
+  const end = (side, name) => viewer.cut[side].map((k, axis) => +(Number.isFinite(k) ? k : bounds[name][axis]).toFixed(3));
+  const text = `voxtile crop ${maps[0].name} -o ${maps[0].name}_part --region ${end('low', 'min').join(' ')} ${end('high', 'max').join(' ')}`;
+  navigator.clipboard?.writeText(text).catch(() => {});
+  say(text);
 });
 $('help').addEventListener('click', () => $('keys').showModal());
 $('menu').addEventListener('click', () => showPanel($('panel').hidden));
@@ -850,7 +909,7 @@ $('theme').addEventListener('click', () => theme(!document.documentElement.class
 const keys = {
   KeyF: () => $('fit').click(), KeyT: () => $('top').click(), KeyL: () => $('side').click(), KeyG: () => $('walk').click(),
   KeyN: () => comparison.step(1), KeyB: () => comparison.step(-1), KeyP: () => showPanel($('panel').hidden), KeyM: () => choose('measure'), KeyV: () => choose('sight'), Escape: () => choose('query'),
-  Slash: () => $('help').click(),
+  Slash: () => $('help').click(), KeyZ: () => $('back').click(), KeyK: () => $('play').click(),
 };
 window.addEventListener('keydown', (event) => {
   if (event.ctrlKey || event.metaKey || event.altKey || $('keys').open || event.target.matches?.('select')) return;
@@ -871,6 +930,7 @@ $('scene').addEventListener('pointerup', (event) => {
 });
 
 function clickAt(x, y) {
+  clickedAt = [x, y];
   const { left, top, width, height } = $('scene').getBoundingClientRect();
   return click(2 * (x - left) / width - 1, 1 - 2 * (y - top) / height);
 }
@@ -884,6 +944,7 @@ viewer.listeners.push(() => {
     paint();
   }
 });
+viewer.flight.orbit.addEventListener('start', keepView);
 viewer.flight.orbit.addEventListener('change', remember);
 viewer.flight.orbit.addEventListener('change', followCamera);
 
