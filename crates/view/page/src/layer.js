@@ -238,6 +238,8 @@ export class Layer {
       if (mesh.isMesh) {
         this.near.remove(mesh);
         mesh.geometry.dispose();
+      } else {
+        mesh.request.abort();
       }
       this.extra.delete(url);
       this.lostNear.delete(url);
@@ -249,12 +251,12 @@ export class Layer {
 
   async loadNear(url, kind) {
     // A tile that left the view and returned has a newer load, which this one must not replace.
-    const load = { isMesh: false };
+    const load = { isMesh: false, request: new AbortController() };
     const isCurrent = () => this.extra.get(url) === load;
     this.extra.set(url, load);
     this.waits = (this.waits ?? 0) + 1;
     try {
-      const response = await fetch(url);
+      const response = await fetch(url, { signal: load.request.signal });
       if (!response.ok) throw new Error(`${response.status}`);
       const mesh = meshOf(parseNode(await response.arrayBuffer()), this.materials[kind]);
       if (!isCurrent() || this.isGone) {
@@ -279,7 +281,7 @@ export class Layer {
     this.isGone = true;
     clearTimeout(this.retryTimer);
     for (const tiles of [this.tiles, this.next]) tiles?.dispose();
-    for (const mesh of this.extra.values()) if (mesh.isMesh) mesh.geometry.dispose();
+    for (const mesh of this.extra.values()) mesh.isMesh ? mesh.geometry.dispose() : mesh.request.abort();
     this.group.removeFromParent();
   }
 }
