@@ -5,7 +5,7 @@
 #   crates/view/page/bundle.sh --check    checks that crates/view/page/dist is up to date and small enough
 set -euo pipefail
 cd "$(dirname "$0")"
-most_gzip=260000
+most_gzip=240000
 
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT

@@ -58,6 +58,9 @@ fn describe(number: usize, map: &ServedMap) -> Value {
         "pending_tiles": state.pending_tiles,
         "unreadable": state.levels.unreadable(),
     });
+    if let Some(crs) = &state.map.config().crs {
+        described["crs"] = crs.as_str().into();
+    }
     if !layers.is_empty() {
         described["layers"] = layers.into();
     }

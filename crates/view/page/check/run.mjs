@@ -107,6 +107,52 @@ const count = async (isWanted) => {
   })()`);
 };
 
+// Checks ground and scale, ends of the colours, views, the card of a click, the command of a cut, and play.
+async function checkHands(map) {
+  const text = (id) => browser.value(`document.getElementById('${id}').innerText.replace(/\\s+/g, ' ').trim()`);
+  const press = async (id) => {
+    await browser.value(`document.getElementById('${id}').click()`);
+    await browser.ready();
+  };
+  await browser.value('voxtile.lookAt([-1.5, 0.02, 0.1], [1.05, 0.05, -0.25])');
+  await browser.ready();
+  const [pixels, away] = await browser.value(`(() => {
+    const { eye, to } = voxtile.camera();
+    return [document.getElementById('bar').offsetWidth / document.getElementById('scene').clientHeight, Math.hypot(...eye.map((k, axis) => k - to[axis]))];
+  })()`);
+  const barM = pixels * 2 * Math.tan(Math.PI / 6) * away;
+  const barText = /^(\d+) (cm|m)$/.exec(await text('bar'));
+  assert.ok(Math.abs(barM - barText[1] * (barText[2] === 'cm' ? 0.01 : 1)) < 0.05 * barM, `${barText[0]} for ${barM} m`);
+  const endsOfColours = await text('legend-ends');
+  await browser.value(`document.getElementById('range-low').value = 400; document.getElementById('range-low').dispatchEvent(new Event('input'))`);
+  assert.notEqual(await text('legend-ends'), endsOfColours);
+  const aside = await browser.value('voxtile.camera()');
+  await press('top');
+  assert.ok(Math.abs((await browser.value('voxtile.camera()')).eye[2] - aside.eye[2]) > 1);
+  await press('back');
+  const returned = await browser.value('voxtile.camera()');
+  assert.ok(Math.hypot(...returned.eye.map((k, axis) => k - aside.eye[axis])) < 1e-6, 'back shows the view before');
+  const clicked = await browser.value('voxtile.clickAt(...voxtile.screenOf([1.05, 0.05, -0.25])).then(() => voxtile.screenOf([1.05, 0.05, -0.25]))');
+  const card = await browser.value('(({ left, top, right, bottom }) => [left, top, right, bottom])(document.getElementById("card").getBoundingClientRect())');
+  const gap = Math.hypot(Math.max(card[0] - clicked[0], clicked[0] - card[2], 0), Math.max(card[1] - clicked[1], clicked[1] - card[3], 0));
+  assert.ok(gap < 30, `the answer is ${gap} pixels from the click`);
+  await browser.value('document.getElementById("card-close").click()');
+  assert.equal(await browser.value('document.getElementById("card").hidden'), true);
+  await browser.value(`document.getElementById('x0').value = 333; document.getElementById('x0').dispatchEvent(new Event('input')); document.getElementById('fit').click(); voxtile.detail = 0.1`);
+  await browser.value('document.getElementById("crop").click()');
+  const region = / --region (.*)$/.exec(await text('message'))[1].split(' ');
+  run('crop', map, '-o', join(work, 'cropped'), '--region', ...region, '-q');
+  const cropped = exported(join(work, 'cropped')).size;
+  assert.ok(cropped > 0 && cropped < exported(map).size);
+  await browser.until(`document.getElementById('state').textContent === 'ready' && voxtile.voxels().count === ${cropped}`, 30);
+  await browser.value('document.getElementById("uncut").click(); document.getElementById("play").click()');
+  await browser.until('document.getElementById("play").ariaPressed === "false" && document.getElementById("scan").value === document.getElementById("scan").max', 20);
+  await browser.ready();
+  assert.equal(await browser.value('document.querySelectorAll("#panel > details:not([hidden])").length'), 5);
+  assert.deepEqual(browser.errors, []);
+  return `a scale bar of ${barText[0]}, ends of colours, the view before, the answer next to the click, a crop of ${cropped} voxels, and play`;
+}
+
 let done = 0;
 const step = (text) => console.log(`${++done}. ${text}`);
 checks: try {
@@ -246,7 +292,8 @@ checks: try {
   assert.deepEqual(browser.errors, []);
   step(`${marked} moving points are shown, follow clean and are hidden`);
 
-  // Distances at a height: obstacles are the occupied voxels of the layer.
+  // Distances at a height: obstacles are the occupied voxels of the layer. Lines of the grid may have any grey.
+  await browser.value('document.getElementById("ground").click()');
   await browser.value(`document.getElementById('fit').click(); document.getElementById('top').click();
     document.getElementById('layer').value = 500; document.getElementById('distances').click()`);
   await browser.until('voxtile.distances()?.values.length > 0', 20);
@@ -364,6 +411,8 @@ checks: try {
   }
   step('small and large screens, light and dark');
   assert.deepEqual(browser.errors, []);
+
+  step(await checkHands(map));
 
   const atRest = await browser.value('voxtile.drawCalls()');
   await browser.value('voxtile.lookAt(...Object.values(voxtile.camera()))');

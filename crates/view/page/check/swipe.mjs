@@ -3,7 +3,8 @@ import assert from 'node:assert/strict';
 const choose = (id, value) => `document.getElementById('${id}').value = '${value}'; document.getElementById('${id}').dispatchEvent(new Event('change'))`;
 const isReady = 'document.getElementById("state").textContent === "ready"';
 
-// Keeps the pixels of the map in the page, and counts those that differ between two pictures in some columns.
+// Keeps the pixels of the map in the page, and counts those that differ between two pictures in some columns. Shades are
+// rounded: a colour may differ by 2 of 255.
 const PICTURES = `window.pictures = {};
   window.keep = (name) => {
     voxtile.draw();
@@ -14,9 +15,10 @@ const PICTURES = `window.pictures = {};
     pictures[name] = new Uint32Array(data.buffer);
     return width;
   };
+  window.isOther = (one, other) => one !== other && [0, 8, 16].some((shift) => Math.abs((one >> shift & 255) - (other >> shift & 255)) > 2);
   window.differing = (one, other, from, to) => {
     const width = document.getElementById('scene').width;
-    return pictures[one].reduce((sum, pixel, k) => sum + (k % width >= from && k % width < to && pixel !== pictures[other][k]), 0);
+    return pictures[one].reduce((sum, pixel, k) => sum + (k % width >= from && k % width < to && isOther(pixel, pictures[other][k])), 0);
   }`;
 
 class SwipePage {

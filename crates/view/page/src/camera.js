@@ -88,21 +88,37 @@ export class Flight {
     this.wake();
   }
 
-  // Fits a box into the view from a direction.
-  fit(box, from = [-0.6, -1, 0.8]) {
+  // Fits a box, or points in it, into the view from a direction.
+  fit(box, from = [-0.6, -1, 0.8], points = []) {
     const center = box.getCenter(new THREE.Vector3());
     const half = box.getSize(new THREE.Vector3()).multiplyScalar(0.5).max(new THREE.Vector3(0.25, 0.25, 0.25));
     const back = new THREE.Vector3(...from).normalize();
     const right = new THREE.Vector3().crossVectors(this.camera.up, back).normalize();
     const up = new THREE.Vector3().crossVectors(back, right);
     const high = Math.tan(THREE.MathUtils.degToRad(this.camera.fov / 2));
-    // Minimum distance with all corners in view.
+    const corners = Array.from({ length: 8 }, (_, corner) => half.clone()
+      .multiply(new THREE.Vector3(corner & 1 ? 1 : -1, corner & 2 ? 1 : -1, corner & 4 ? 1 : -1)));
+    const all = points.length ? points.map((point) => point.clone().sub(center)) : corners;
+    const seen = all.map((at) => [at.dot(right), at.dot(up), at.dot(back)]);
+    // Minimum distance with all in view; the middle of points is in its middle, and the center of a box without points.
+    const shift = [0, 0];
     let distance = 0;
-    for (let corner = 0; corner < 8; corner++) {
-      const at = half.clone().multiply(new THREE.Vector3(corner & 1 ? 1 : -1, corner & 2 ? 1 : -1, corner & 4 ? 1 : -1));
-      const aside = Math.max(Math.abs(at.dot(up)) / high, Math.abs(at.dot(right)) / (high * this.camera.aspect));
-      distance = Math.max(distance, at.dot(back) + 1.05 * aside);
+    for (let round = 0; round < 4; round++) {
+      distance = 0.5;
+      for (const [x, y, z] of seen) {
+        const aside = Math.max(Math.abs(y - shift[1]) / high, Math.abs(x - shift[0]) / (high * this.camera.aspect));
+        distance = Math.max(distance, z + 1.06 * aside);
+      }
+      for (const axis of points.length ? [0, 1] : []) {
+        let [least, most] = [Infinity, -Infinity];
+        for (const at of seen) {
+          const place = (at[axis] - shift[axis]) / (distance - at[2]);
+          [least, most] = [Math.min(least, place), Math.max(most, place)];
+        }
+        shift[axis] += 0.5 * (least + most) * distance;
+      }
     }
+    center.addScaledVector(right, shift[0]).addScaledVector(up, shift[1]);
     this.step = half.length() / 30;
     this.lookAt(center.clone().addScaledVector(back, distance).toArray(), center.toArray());
   }

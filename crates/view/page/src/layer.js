@@ -55,11 +55,12 @@ export class Layer {
         group.userData.mesh = mesh;
         return group;
       },
-      calculateBytesUsed: (tile, scene) => {
-        const mesh = scene?.userData.mesh;
-        return mesh ? bytesOf(mesh.userData.node, mesh.userData.faces) : 0;
-      },
     });
+    // The renderer's own estimate would count shared indices in each mesh, and no voxels for picking.
+    tiles.calculateBytesUsed = (tile, scene) => {
+      const mesh = scene?.userData.mesh;
+      return mesh ? bytesOf(mesh.userData.node, mesh.userData.faces) : 0;
+    };
     tiles.setCamera(this.viewer.camera);
     tiles.setResolutionFromRenderer(this.viewer.camera, this.viewer.renderer);
     tiles.lost = new Set();
@@ -77,7 +78,7 @@ export class Layer {
 
   // Loads the voxels with the values of another layer, or with another legend.
   paintBy(legend) {
-    const coloursOf = (one) => JSON.stringify(one && [one.range, one.classes.map((each) => each.class)]);
+    const coloursOf = (one) => JSON.stringify(one && one.classes.map((each) => each.class));
     const isSame = coloursOf(this.legend) === coloursOf(legend);
     this.legend = legend;
     const { layerName } = this.next ?? this.tiles;
@@ -237,6 +238,8 @@ export class Layer {
       if (mesh.isMesh) {
         this.near.remove(mesh);
         mesh.geometry.dispose();
+      } else {
+        mesh.request.abort();
       }
       this.extra.delete(url);
       this.lostNear.delete(url);
@@ -248,12 +251,12 @@ export class Layer {
 
   async loadNear(url, kind) {
     // A tile that left the view and returned has a newer load, which this one must not replace.
-    const load = { isMesh: false };
+    const load = { isMesh: false, request: new AbortController() };
     const isCurrent = () => this.extra.get(url) === load;
     this.extra.set(url, load);
     this.waits = (this.waits ?? 0) + 1;
     try {
-      const response = await fetch(url);
+      const response = await fetch(url, { signal: load.request.signal });
       if (!response.ok) throw new Error(`${response.status}`);
       const mesh = meshOf(parseNode(await response.arrayBuffer()), this.materials[kind]);
       if (!isCurrent() || this.isGone) {
@@ -278,7 +281,7 @@ export class Layer {
     this.isGone = true;
     clearTimeout(this.retryTimer);
     for (const tiles of [this.tiles, this.next]) tiles?.dispose();
-    for (const mesh of this.extra.values()) if (mesh.isMesh) mesh.geometry.dispose();
+    for (const mesh of this.extra.values()) mesh.isMesh ? mesh.geometry.dispose() : mesh.request.abort();
     this.group.removeFromParent();
   }
 }

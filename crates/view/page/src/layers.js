@@ -1,7 +1,5 @@
 // Colours by the layers of a map: colour, intensity, class and time of the points that hit a voxel.
 
-import { colourAt } from './palette.js';
-
 // Choices of colours, and the layers that they need.
 export const BY_LAYER = { rgb: 'colour', intensity: 'intensity', class: 'class', age: 'time' };
 // Voxels without a value.
@@ -20,12 +18,14 @@ export function parseValues(view, at, count, number) {
     const number = low[i] | high[i] << 8;
     return number === 0 ? null : least + (most - least) * (number - 1) / 65534;
   };
-  return { name, valueOf };
+  // Numbers are those of `valueOf`, as two bytes: software adjusts their colours without loading them again.
+  return { name, valueOf, low, high, least, most };
 }
 
 export const bytesOfValues = (count, number) => (number === 0 ? 0 : number === 1 ? 4 * count : 16 + 2 * count);
 
-// Returns the colours of the voxels of a node: red, green, blue, 255; alpha is 0 without a value.
+// Returns the colours of the voxels of a node: red, green, blue, 255; alpha is 0 without a value. Intensities and times
+// are two bytes of a number instead, low and high, whose colours the drawing finds by their range.
 export function paintOf({ count, values }, legend) {
   const paint = new Uint8Array(4 * count);
   if (values.name === 'colour') {
@@ -33,11 +33,10 @@ export function paintOf({ count, values }, legend) {
     return paint;
   }
   const classes = new Map(legend?.classes?.map((one) => [one.class, one.color]));
-  const [low, high] = rangeOf(legend) ?? [0, 1];
   for (let i = 0; i < count; i++) {
     const value = values.valueOf(i);
     if (value === null) continue;
-    const colour = values.name === 'class' ? classes.get(Math.round(value)) : colourAt((value - low) / Math.max(high - low, 1e-9));
+    const colour = values.name === 'class' ? classes.get(Math.round(value)) : [values.low[i], values.high[i], 0];
     if (colour) paint.set([...colour, 255], 4 * i);
   }
   return paint;

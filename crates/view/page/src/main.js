@@ -3,6 +3,7 @@
 import { Comparison } from './comparison.js';
 import { coloursOf, readDistances } from './distances.js';
 import { BY_LAYER, NO_VALUE, className, endsOf, joined, timeText } from './layers.js';
+import { Ground } from './ground.js';
 import { readLink, writeLink } from './link.js';
 import { logOddsOf, observationsOf, probabilityOf } from './node.js';
 import { pointMaterial } from './material.js';
@@ -10,6 +11,7 @@ import { readMoving } from './moving.js';
 import { CHANGES, LAYERS, MOVING, OBSTACLE, drawLegend } from './palette.js';
 import { centerOf, pick } from './pick.js';
 import { Swipe, sidesOf } from './swipe.js';
+import { ceilingOf, obliqueOf, survey } from './survey.js';
 import { Viewer } from './viewer.js';
 
 const $ = (id) => document.getElementById(id);
@@ -46,11 +48,20 @@ const swatchOf = (colour) => {
 };
 const comparison = new Comparison({ viewer, json, say, swatchOf });
 const swipe = new Swipe(viewer, remember);
+const ground = new Ground(viewer);
 let link = readLink();
 let maps = [];
 let tool = 'query';
 let marks = [];
 let answered = null;
+// Place of the last click on the screen.
+let clickedAt = [0, 0];
+// Earlier views, and when the last one was left.
+const views = [];
+let leftAt = 0;
+let playTimer = 0;
+// Ends of the colours that the user chose, by what is coloured.
+const chosen = new Map();
 // Legend of the layer by which voxels are coloured, and the number of the last request for it.
 let legend = null;
 let legendNumber = 0;
@@ -58,6 +69,7 @@ let legendShown = 0;
 // Number of the last choice of states to show.
 let shownNumber = 0;
 let path = [];
+let showsCeiling = false;
 let pathNumber = 0;
 // Marked points of the first map that were loaded last, and the number of the last request for them.
 let moving = null;
@@ -72,6 +84,7 @@ const COLOURS = [['height', 'height'], ['probability', 'probability'], ['count',
   ['rgb', 'colour'], ['intensity', 'intensity'], ['class', 'class'], ['age', 'last hit']];
 // Sliders of the cut, and their positions without a cut.
 const CUTS = ['x0', 'x1', 'y0', 'y1', 'z0', 'z1'];
+const MOST_VIEWS = 50;
 const OPEN = ['0', '1000', '0', '1000', '0', '1000'];
 
 // The page lists the snapshots of the first map. A map without a snapshot of the chosen name is shown in its current
@@ -102,6 +115,14 @@ function answer(rows) {
     dd.append(value);
     return [dt, dd];
   }));
+  $('card').hidden = rows.length === 0;
+  if (!rows.length) return;
+  // The card is next to the click, within the picture.
+  const { left, top, width, height } = $('scene').getBoundingClientRect();
+  const within = (at, size, low, space) => Math.max(Math.min(at > low + space - size - 16 ? at - size - 14 : at + 14, low + space - size - 8), low + 8);
+  const { offsetWidth, offsetHeight } = $('card');
+  $('card').style.left = `${within(clickedAt[0], offsetWidth, left, width)}px`;
+  $('card').style.top = `${within(clickedAt[1], offsetHeight, top, height)}px`;
 }
 
 // --- Maps
@@ -154,8 +175,11 @@ function allBounds() {
 // one, so that equal colours are equal heights.
 async function readExtents() {
   await Promise.all(maps.map(async (map) => {
-    const { root } = await json(`maps/${comparison.info ? comparison.id : map.id}/tileset.json`);
+    const url = `maps/${comparison.info ? comparison.id : map.id}/tileset.json`;
+    const tileset = await json(url);
+    const { root } = tileset;
     if (!root.children) return;
+    map.survey = await survey(tileset, new URL(url, location.href)).catch(() => null);
     const box = root.boundingVolume.box;
     const half = [box[3], box[7], box[11]];
     map.bounds = { min: half.map((k, axis) => box[axis] - k), max: half.map((k, axis) => box[axis] + k) };
@@ -167,7 +191,33 @@ async function readExtents() {
 async function readCompared() {
   await readMaps();
   await readExtents().catch(() => {});
-  viewer.surround(allBounds());
+  surround();
+}
+
+// Returns the box of most voxels of all maps, and some of them.
+function mostOf() {
+  const known = maps.map((map) => map.survey).filter(Boolean);
+  if (known.length === 0) return [allBounds(), []];
+  const end = (name, least) => [0, 1, 2].map((k) => least(...known.map(({ core }) => core[name][k])));
+  const cutAt = ceiling();
+  const points = known.flatMap((one) => one.points).filter((point) => cutAt === null || point[2] < cutAt);
+  return [{ min: end('min', Math.min), max: end('max', Math.max) }, points];
+}
+
+function surround() {
+  viewer.surround(allBounds(), ...mostOf());
+  const heights = maps.map((map) => map.survey?.heights?.[0] ?? map.low);
+  ground.height = Math.min(...heights);
+  ground.name(maps[0]?.crs);
+}
+
+// Returns the height above which the ceiling is hidden; `null` for maps without one, and if it is shown.
+function ceiling() {
+  const one = maps.length === 1 && !showsCeiling && !comparison.info ? maps[0].survey : null;
+  if (one && one.path !== path) [one.path, one.ceiling] = [path, ceilingOf(one, path)];
+  const at = one?.ceiling ?? null;
+  $('ceiling').hidden = at === null;
+  return at;
 }
 
 async function showMaps() {
@@ -354,7 +404,7 @@ async function loadLegend(refreshed = []) {
   paint();
 }
 
-function paintLegend() {
+function paintLegend(range) {
   const choice = $('colour').value;
   const isClass = choice === 'class';
   const rows = (isClass ? legend?.classes ?? [] : []).map((one) => {
@@ -370,7 +420,46 @@ function paintLegend() {
   }
   $('legend-classes').replaceChildren(...rows);
   $('legend-classes').hidden = rows.length === 0;
-  return endsOf(choice, legend);
+  return endsOf(choice, legend && { ...legend, range: legend.range && range });
+}
+
+// Heights of all voxels, and of most: from the 2nd to the 98th percentile.
+function heightsOf() {
+  const of = (least, end, from) => least(...maps.map((map) => from(map)?.[end]).filter(Number.isFinite));
+  const both = (from) => [of(Math.min, 0, from), of(Math.max, 1, from)];
+  const domain = both((map) => [map.low, map.high]);
+  const range = both((map) => map.survey?.heights ?? [map.low, map.high]);
+  return { domain, range: [Math.max(range[0], domain[0]), Math.min(range[1], domain[1], ceiling() ?? Infinity)] };
+}
+
+// Returns the possible values of what is coloured, the range of the colours, and the texts of its ends.
+function colourScale() {
+  const scale = viewer.layers[0]?.scale ?? { least: 0, most: 3.5 };
+  const scans = [0, Math.max(...maps.map((map) => map.scans ?? 1), 1)];
+  const counts = maps.map((map) => map.survey?.counts).filter(Boolean);
+  const [low, high] = legend?.range ?? [0, 1];
+  const scales = {
+    height: { ...heightsOf(), texts: (range) => range.map(metres) },
+    probability: { domain: [0, 255], texts: (range) => range.map((value) => probabilityOf(logOddsOf(scale, value)).toFixed(2)) },
+    count: {
+      domain: [0, 128],
+      range: counts.length ? [Math.min(...counts.map((pair) => pair[0])), Math.max(...counts.map((pair) => pair[1]))] : [0, 128],
+      texts: (range) => range.map((value, k) => `${observationsOf(value)}${k ? '+' : ''}`),
+    },
+    scan: { domain: scans, texts: (range) => range.map((value) => String(Math.max(Math.round(value), 1))) },
+    intensity: { domain: [Math.max(2 * low - high, Math.min(low, 0)), 2 * high - low], range: [low, high] },
+    age: { domain: [low, high] },
+  };
+  const found = scales[viewer.colour] ?? { domain: [0, 1] };
+  return { ...found, range: chosen.get(viewer.colour) ?? found.range ?? found.domain };
+}
+
+function chooseRange(isHigh) {
+  const { domain, range } = colourScale();
+  const at = ['range-low', 'range-high'].map((id) => domain[0] + (domain[1] - domain[0]) * $(id).value / 1000);
+  const least = (domain[1] - domain[0]) / 1000;
+  chosen.set(viewer.colour, isHigh ? [range[0], Math.max(at[1], range[0] + least)] : [Math.min(at[0], range[1] - least), range[1]]);
+  paint();
 }
 
 function paint() {
@@ -378,15 +467,16 @@ function paint() {
   viewer.threshold = Number($('threshold').value);
   const scale = viewer.layers[0]?.scale ?? { least: 0, most: 3.5 };
   $('threshold-out').value = probabilityOf(logOddsOf(scale, viewer.threshold)).toFixed(3);
-  const map = maps[0];
   const isChange = viewer.layers.some(({ id }) => id.includes('~'));
   $('colours').hidden = comparison.isShown;
-  const ends = {
-    height: [metres(map.low), metres(map.high)],
-    probability: [0, 255].map((value) => probabilityOf(logOddsOf(scale, value)).toFixed(2)),
-    count: ['1', `${observationsOf(128)}+`],
-    scan: ['1', String(map.scans ?? 1)],
-  }[viewer.colour] ?? paintLegend();
+  const { domain, range, texts } = colourScale();
+  viewer.range = range;
+  viewer.heights = viewer.colour === 'height' ? range : heightsOf().range;
+  const wide = Math.max(domain[1] - domain[0], 1e-9);
+  const shares = range.map((value) => (value - domain[0]) / wide);
+  ['range-low', 'range-high'].forEach((id, k) => { $(id).value = Math.round(1000 * shares[k]); });
+  drawLegend($('legend'), ...shares);
+  const ends = BY_LAYER[viewer.colour] ? paintLegend(range) : texts(range);
   if (isChange || !BY_LAYER[viewer.colour]) $('legend-classes').hidden = true;
   $('legend').hidden = isChange || ['rgb', 'class'].includes(viewer.colour);
   if (comparison.isShown) {
@@ -419,6 +509,7 @@ function cut() {
       $(`${axis}${end}-out`).value = isOpen ? 'all' : metres(at);
     }
   });
+  viewer.cut.high[2] = Math.min(viewer.cut.high[2], ceiling() ?? Infinity);
   // Voxels above the distances would hide them.
   if ($('distances').checked) viewer.cut.high[2] = Math.min(viewer.cut.high[2], layerHeight() + 0.25 * maps[0].resolution_m);
   viewer.wake();
@@ -627,7 +718,7 @@ async function change() {
   }
   const changed = before.filter((was) => maps.some(({ id, generation }) => id === was.id && generation !== was.generation));
   if (changed.some(({ generation, low, high }) => generation === 0 || low === high)) start();
-  else viewer.surround(allBounds());
+  else surround();
   // While the map is read for the first time, its new generations are not flushes.
   if (changed.some((was) => was.pending_tiles === 0 && was.generation > 0)) {
     $('live').hidden = false;
@@ -671,9 +762,12 @@ document.addEventListener('visibilitychange', () => {
 
 function start() {
   viewer.center(allBounds());
+  surround();
   if (link.eye && link.to) viewer.flight.lookAt(viewer.toScene(link.eye), viewer.toScene(link.to));
-  else viewer.flight.fit(viewer.box);
+  else viewer.frameMost(oblique());
 }
+
+const oblique = () => obliqueOf(mostOf()[1], path);
 
 // --- Controls
 
@@ -714,6 +808,14 @@ $('bounds').addEventListener('change', () => {
   viewer.wake();
 });
 $('scan').addEventListener('input', showScan);
+$('ground').addEventListener('change', () => ground.show($('ground').checked));
+$('ceiling').addEventListener('click', () => {
+  showsCeiling = true;
+  surround();
+  cut();
+  paint();
+});
+for (const id of ['range-low', 'range-high']) $(id).addEventListener('input', () => chooseRange(id === 'range-high'));
 $('grid').addEventListener('change', () => {
   if ($('grid').checked) viewer.overlays.tiles('grid', { ...allBounds(), min: [...allBounds().min.slice(0, 2), maps[0].low] }, maps[0].tile_size_m, 0x7d8594);
   else viewer.overlays.set('grid', null);
@@ -727,9 +829,9 @@ $('compared').addEventListener('change', async () => {
 });
 for (const one of ['query', 'measure', 'sight']) $(`tool-${one}`).addEventListener('click', () => choose(one));
 $('copy').addEventListener('click', () => navigator.clipboard?.writeText(answered.voxel_center_m.join(' ')).catch((error) => say(error.message)));
-$('fit').addEventListener('click', () => viewer.flight.fit(viewer.box));
-$('top').addEventListener('click', () => viewer.flight.fit(viewer.box, [0, -0.001, 1]));
-$('side').addEventListener('click', () => viewer.flight.fit(viewer.box, [0, -1, 0.05]));
+$('fit').addEventListener('click', () => keepView() || viewer.frameMost(oblique()));
+$('top').addEventListener('click', () => keepView() || viewer.frameMost([0, -0.001, 1]));
+$('side').addEventListener('click', () => keepView() || viewer.frameMost([0, -1, 0.05]));
 $('walk').addEventListener('click', () => {
   viewer.flight.walk(!viewer.flight.walks);
   $('walk').setAttribute('aria-pressed', String(viewer.flight.walks));
@@ -743,6 +845,48 @@ $('shot').addEventListener('click', () => {
     setTimeout(() => URL.revokeObjectURL(a.href), 1000);
   });
 });
+// Remembers the present view for `Back`. The steps of a wheel are one change.
+function keepView() {
+  const now = performance.now();
+  if (now - leftAt > 500) views.push([viewer.camera.position, viewer.flight.orbit.target].map((at) => viewer.toMap(at.toArray())));
+  leftAt = now;
+  if (views.length > MOST_VIEWS) views.shift();
+  $('back').disabled = false;
+}
+
+$('back').addEventListener('click', () => {
+  const view = views.pop();
+  $('back').disabled = views.length === 0;
+  leftAt = 0;
+  if (view) viewer.flight.lookAt(...view.map((at) => viewer.toScene(at)));
+});
+$('card-close').addEventListener('click', () => choose(tool));
+
+// Moves the sensor along the trajectory in ten seconds or more.
+function play(isOn) {
+  clearInterval(playTimer);
+  playTimer = 0;
+  $('play').setAttribute('aria-pressed', String(isOn));
+  if (!isOn) return;
+  const last = Number($('scan').max);
+  if (Number($('scan').value) === last) $('scan').value = 0;
+  const step = Math.max(Math.round(last / 100), 1);
+  playTimer = setInterval(() => {
+    $('scan').value = Math.min(Number($('scan').value) + step, last);
+    showScan();
+    if (Number($('scan').value) >= last) play(false);
+  }, 100);
+}
+$('play').addEventListener('click', () => play(!playTimer));
+
+// Copies the command that crops the map to the cut.
+$('crop').addEventListener('click', () => {
+  const bounds = allBounds();
+  const end = (side, name) => viewer.cut[side].map((k, axis) => +(Number.isFinite(k) ? k : bounds[name][axis]).toFixed(3));
+  const text = `voxtile crop ${maps[0].name} -o ${maps[0].name}_part --region ${end('low', 'min').join(' ')} ${end('high', 'max').join(' ')}`;
+  navigator.clipboard?.writeText(text).catch(() => {});
+  say(text);
+});
 $('help').addEventListener('click', () => $('keys').showModal());
 $('menu').addEventListener('click', () => showPanel($('panel').hidden));
 function showPanel(on) {
@@ -754,6 +898,8 @@ function theme(dark) {
   document.documentElement.classList.toggle('dark', dark);
   viewer.scene.background = null;
   viewer.renderer.setClearColor(dark ? 0x14161b : 0xf4f5f7, 1);
+  ground.paint(dark);
+  viewer.shading.setSky(...(dark ? [0.03, 0.035, 0.05] : [-0.09, -0.06, -0.02]));
   viewer.wake();
 }
 const scheme = matchMedia('(prefers-color-scheme: dark)');
@@ -763,7 +909,7 @@ $('theme').addEventListener('click', () => theme(!document.documentElement.class
 const keys = {
   KeyF: () => $('fit').click(), KeyT: () => $('top').click(), KeyL: () => $('side').click(), KeyG: () => $('walk').click(),
   KeyN: () => comparison.step(1), KeyB: () => comparison.step(-1), KeyP: () => showPanel($('panel').hidden), KeyM: () => choose('measure'), KeyV: () => choose('sight'), Escape: () => choose('query'),
-  Slash: () => $('help').click(),
+  Slash: () => $('help').click(), KeyZ: () => $('back').click(), KeyK: () => $('play').click(),
 };
 window.addEventListener('keydown', (event) => {
   if (event.ctrlKey || event.metaKey || event.altKey || $('keys').open || event.target.matches?.('select')) return;
@@ -784,6 +930,7 @@ $('scene').addEventListener('pointerup', (event) => {
 });
 
 function clickAt(x, y) {
+  clickedAt = [x, y];
   const { left, top, width, height } = $('scene').getBoundingClientRect();
   return click(2 * (x - left) / width - 1, 1 - 2 * (y - top) / height);
 }
@@ -797,6 +944,7 @@ viewer.listeners.push(() => {
     paint();
   }
 });
+viewer.flight.orbit.addEventListener('start', keepView);
 viewer.flight.orbit.addEventListener('change', remember);
 viewer.flight.orbit.addEventListener('change', followCamera);
 
@@ -863,8 +1011,11 @@ if (matchMedia('(max-width: 700px)').matches) showPanel(false);
 try {
   chooseOption('compared', link.compared);
   await readMaps();
+  // The first view is one of the trajectory.
+  const first = readPath();
   await readExtents();
   applyLink();
+  await first;
   start();
   showMaps();
   cut();

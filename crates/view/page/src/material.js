@@ -34,7 +34,8 @@ void main() {
   vec3 mid = (modelMatrix * vec4(place.xyz + 0.5, 1.0)).xyz;
   isSeen = isSeen && all(greaterThanEqual(mid, low)) && all(lessThanEqual(mid, high));
   if (!isSeen) { gl_Position = vec4(2.0, 2.0, 2.0, 1.0); return; }
-  vec2 uv = position.xy;
+  int number = gl_VertexID & 3;
+  vec2 uv = vec2(number == 1 || number == 2, number > 1);
   vec3 at;
   // Corners are counterclockwise seen from outside.
   if (side == 0) { at = vec3(1.0, uv); light = 0.86; }
@@ -56,7 +57,8 @@ uniform sampler2D ramp;
 uniform vec4 tint;
 uniform vec3 changes[3];
 uniform int kind;
-uniform bool isPainted;
+uniform int painted;
+uniform vec2 paintShares;
 uniform vec3 noValue;
 varying vec2 corner;
 varying float share;
@@ -66,10 +68,15 @@ varying vec3 classColour;
 varying vec4 layerColour;
 vec3 linearOf(vec3 c) { return mix(c / 12.92, pow((c + 0.055) / 1.055, vec3(2.4)), step(0.04045, c)); }
 void main() {
-  vec3 colour = texture2D(ramp, vec2(share, 0.5)).rgb;
+  vec3 colour = texture2D(ramp, vec2(share * 255.0 / 256.0 + 0.5 / 256.0, 0.5)).rgb;
   if (kind == 3) colour = change < 1.5 ? changes[0] : change < 2.5 ? changes[1] : changes[2];
   else if (kind == 4) colour = classColour;
-  else if (isPainted) colour = layerColour.a > 0.5 ? linearOf(layerColour.rgb) : noValue;
+  else if (painted == 1) colour = layerColour.a > 0.5 ? linearOf(layerColour.rgb) : noValue;
+  else if (painted == 2) {
+    float number = dot(round(layerColour.rg * 255.0), vec2(1.0, 256.0));
+    float along = mix(paintShares.x, paintShares.y, (number - 1.0) / 65534.0);
+    colour = layerColour.a > 0.5 ? texture2D(ramp, vec2(clamp(along, 0.0, 1.0) * 255.0 / 256.0 + 0.5 / 256.0, 0.5)).rgb : noValue;
+  }
   else if (tint.a > 0.0) colour = tint.rgb * (0.55 + 0.45 * share);
   // Draw borders if a voxel is large enough on the screen.
   vec2 pixel = fwidth(corner);
@@ -102,9 +109,10 @@ export function makeMaterial(kind, shared) {
       threshold: { value: 0 },
       range: { value: new THREE.Vector2(0, 1) },
       lastScan: { value: 0 },
-      // Name of the layer that is shown, and whether the drawn node has its colours.
+      // Name of the layer that is shown, and whether the drawn node has its colours (1) or its numbers (2).
       layer: { value: null },
-      isPainted: { value: false },
+      painted: { value: 0 },
+      paintShares: { value: new THREE.Vector2(0, 1) },
       noValue: { value: linear(NO_VALUE) },
     },
   });
@@ -154,6 +162,8 @@ export const sharedUniforms = () => ({
   low: { value: new THREE.Vector3(-Infinity, -Infinity, -Infinity) },
   high: { value: new THREE.Vector3(Infinity, Infinity, Infinity) },
   colourBy: { value: 0 },
+  // Range of the colours of intensities and times.
+  paintRange: { value: [0, 1] },
   // Classes of a comparison that are shown, as bits.
   classes: { value: 255 },
 });

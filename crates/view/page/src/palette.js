@@ -29,10 +29,11 @@ const texture = (colours) => {
 
 export const ramp = texture(Array.from({ length: 256 }, (_, k) => colourAt(k / 255)));
 
-export function drawLegend(canvas) {
+// Draws the colours of a range, as shares of the canvas's width.
+export function drawLegend(canvas, low = 0, high = 1) {
   const context = canvas.getContext('2d');
   for (let k = 0; k < canvas.width; k++) {
-    context.fillStyle = `rgb(${colourAt(k / (canvas.width - 1))})`;
+    context.fillStyle = `rgb(${colourAt((k / (canvas.width - 1) - low) / Math.max(high - low, 1e-6))})`;
     context.fillRect(k, 0, 1, canvas.height);
   }
 }

@@ -6,20 +6,23 @@ import { LAYERS } from './palette.js';
 import { sharedUniforms } from './material.js';
 import { KIND } from './node.js';
 import { OF_FIRST_MAP, Overlays } from './overlays.js';
+import { Shading } from './shading.js';
 
 const MOST_CALLS = 200;
-// Draw calls reserved for overlays: trajectory, sensor, moving points, distances, marks, change, grid, bounding box.
-const OVERLAY_CALLS = 10;
+// Draw calls reserved for overlays: trajectory, sensor, moving points, distances, marks, change, ground, grid, bounding box;
+// and for the shading.
+const OVERLAY_CALLS = 14;
 
 // Scene with layers, overlays and camera. Draws only after changes.
 export class Viewer {
   constructor(canvas, say) {
     this.say = say;
     this.canvas = canvas;
-    this.renderer = new THREE.WebGLRenderer({ canvas, antialias: true });
+    this.renderer = new THREE.WebGLRenderer({ canvas, antialias: false, depth: false });
     this.renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
     // A frame of a swipe is drawn in two calls.
     this.renderer.info.autoReset = false;
+    this.shading = new Shading(this.renderer);
     this.scene = new THREE.Scene();
     // Scene coordinates are relative to the middle of the maps, which may be millions of metres from the origin.
     this.world = new THREE.Group();
@@ -40,7 +43,12 @@ export class Viewer {
     this.classes = 255;
     this.cut = { low: [-Infinity, -Infinity, -Infinity], high: [Infinity, Infinity, Infinity] };
     this.colour = 'height';
+    // Range of colours: of the chosen values, and of heights in metres.
+    this.range = [0, 1];
+    this.heights = [0, 1];
     this.listeners = [];
+    // Called before each frame is drawn.
+    this.moves = [];
     this.firstPictureMs = null;
     this.frames = 0;
     this.mostCalls = 0;
@@ -55,16 +63,27 @@ export class Viewer {
   }
 
   // Sets the scene's origin to whole metres in the middle of the maps, once.
-  center(bounds) {
+  center(bounds, core, points) {
     const middle = [0, 1, 2].map((k) => Math.round((bounds.min[k] + bounds.max[k]) / 2));
     this.world.position.set(...middle.map((k) => -k));
     this.world.updateMatrixWorld(true);
-    this.surround(bounds);
+    this.surround(bounds, core, points);
   }
 
-  // Sets the box shown by `Fit`.
-  surround(bounds) {
-    this.box = new THREE.Box3(...['min', 'max'].map((end) => new THREE.Vector3(...this.toScene(bounds[end]))));
+  // Sets the box of all voxels, and of most voxels, with some of them: the first frame.
+  surround(bounds, core = bounds, points = []) {
+    this.core = this.boxOf(core);
+    this.points = points.map((point) => new THREE.Vector3(...this.toScene(point)));
+    this.box = this.boxOf(bounds);
+  }
+
+  boxOf(bounds) {
+    return new THREE.Box3(...['min', 'max'].map((end) => new THREE.Vector3(...this.toScene(bounds[end]))));
+  }
+
+  // Fits most voxels into the view, from a direction.
+  frameMost(from) {
+    this.flight.fit(this.core, from, this.points);
   }
 
   toScene(point) {
@@ -122,6 +141,7 @@ export class Viewer {
     for (const layer of this.layers) layer.tiles.group.visible = layer.isShown && this.shows.occupied;
     for (const layer of this.layers) layer.near.visible = layer.isShown;
     this.leaveOutFarthest();
+    for (const follow of this.moves) follow();
     this.draw();
     this.frames++;
     this.mostCalls = Math.max(this.mostCalls, this.renderer.info.render.calls);
@@ -141,24 +161,20 @@ export class Viewer {
   }
 
   draw() {
-    const { renderer, scene, camera, layers } = this;
+    const { renderer, shading, scene, camera, layers } = this;
     renderer.info.reset();
     if (!this.isSplit) {
-      renderer.render(scene, camera);
+      shading.draw(scene, camera);
       return;
     }
     const { border, canvas } = this;
-    const ratio = renderer.getPixelRatio();
-    renderer.setScissorTest(true);
     for (const [side, from, to] of [[0, 0, border], [1, border, canvas.width]]) {
       if (from === to) continue;
       for (const layer of layers) layer.group.visible = layer.side === side;
       if (layers[0].side === side) camera.layers.enable(OF_FIRST_MAP);
       else camera.layers.disable(OF_FIRST_MAP);
-      renderer.setScissor(from / ratio, 0, (to - from) / ratio, canvas.height / ratio);
-      renderer.render(scene, camera);
+      shading.draw(scene, camera, from, to);
     }
-    renderer.setScissorTest(false);
     for (const layer of layers) layer.group.visible = true;
     camera.layers.enable(OF_FIRST_MAP);
   }
@@ -198,16 +214,16 @@ export class Viewer {
   // Sets the uniforms from the controls.
   paint() {
     this.shared.colourBy.value = ['height', 'probability', 'count', 'scan'].indexOf(this.colour);
+    this.shared.paintRange.value = this.range;
     this.shared.classes.value = this.classes;
     this.shared.low.value.set(...this.toScene(this.cut.low));
     this.shared.high.value.set(...this.toScene(this.cut.high));
     for (const layer of this.layers) {
       const uniforms = layer.material.uniforms;
       uniforms.threshold.value = this.threshold;
-      const z = [layer.map.low, layer.map.high].map((k) => k + this.world.position.z);
-      // Voxels without values of the layer, or whose values are not loaded yet, are coloured by height.
-      const range = { probability: [0, 255], count: [0, 128], scan: [0, Math.max(layer.map.scans ?? 1, 1)] }[this.colour] ?? z;
-      uniforms.range.value.set(...range);
+      // Voxels whose values are not loaded yet are coloured by height.
+      const isHeight = !['probability', 'count', 'scan'].includes(this.colour);
+      uniforms.range.value.set(...(isHeight ? this.heights.map((k) => k + this.world.position.z) : this.range));
       uniforms.layer.value = BY_LAYER[this.colour] ?? null;
     }
   }
