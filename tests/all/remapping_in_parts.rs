@@ -114,15 +114,21 @@ fn parts_of_another_map_or_state_are_refused() {
     let foreign = MapPath::on(disk.shared(), "/parts/foreign");
     voxtile::OutOfCoreTileMapper::create(foreign, config()).unwrap();
     let mut with_foreign = parts.clone();
-    with_foreign.push((Some("/parts/foreign".into()), serde_json::to_string(&RemapPart::default()).unwrap()));
+    let far_away =
+        r#"{"replaced":[],"moved":[],"region":[[90,90,0],[90,90,0]],"scans_mapped":0,"updates_mapped":0}"#;
+    with_foreign.push((Some("/parts/foreign".into()), far_away.to_owned()));
     let message = message_of(join(&disk, &poses, &with_foreign, &how));
     assert!(message.contains("no part of a remap"), "{message}");
     assert_eq!(seen(&disk), whole);
+    // A part twice.
+    let twice = [&parts[..], &parts[..1]].concat();
+    let message = message_of(join(&disk, &poses, &twice, &how));
+    assert!(message.contains("overlap"), "{message}");
     // A part is missing, or its text.
     let at_first = parts.iter().position(|(shard, _)| shard.is_some()).unwrap();
     let (mut fewer, mut textless) = (parts.clone(), parts.clone());
     fewer.remove(at_first);
-    textless[at_first].1 = serde_json::to_string(&RemapPart::default()).unwrap();
+    textless[at_first].1 = far_away.to_owned();
     for given in [fewer, textless] {
         let message = message_of(join(&disk, &poses, &given, &how));
         assert!(message.contains("pass all parts") || message.contains("no part replaces"), "{message}");

@@ -206,7 +206,7 @@ fn joined(
     let kept: FxHashSet<TileIndex> = store.tiles().iter().filter(|tile| !replaced.contains(tile)).collect();
     let config = how.replay.config_of(&store)?;
     let (map_id, mut records, grid) = (store.map_id(), store.archive().records()?, config.grid);
-    let regions = regions_of(parts);
+    let regions = regions_of(parts)?;
     let mut remapper = Remapper::begin(store, config, replaced, how.replay.stop.clone())?;
     while let Some(entry) = records.next_entry()? {
         how.replay.stop.check()?;
@@ -253,8 +253,27 @@ fn joined(
 type Columns = [[i64; 2]; 2];
 
 /// Returns the regions of all parts.
-fn regions_of(parts: &[(Option<MapPath>, RemapPart)]) -> BTreeSet<Columns> {
-    parts.iter().map(|(_, RemapPart { region: [min, max], .. })| columns_of(*min, *max)).collect()
+///
+/// # Errors
+///
+/// Regions that overlap.
+fn regions_of(parts: &[(Option<MapPath>, RemapPart)]) -> Result<Vec<Columns>> {
+    let regions: Vec<Columns> =
+        parts.iter().map(|(_, RemapPart { region: [min, max], .. })| columns_of(*min, *max)).collect();
+    let overlaps = |at: usize| regions[..at].iter().any(|before| common_columns(before, &regions[at]) > 0);
+    if (0..regions.len()).any(overlaps) {
+        return Err(Error::argument("parts", "regions overlap: pass each part once, with its own text"));
+    }
+    Ok(regions)
+}
+
+/// Returns the number of columns that two rectangles have in common.
+fn common_columns(one: &Columns, other: &Columns) -> i128 {
+    let along = |axis: usize| {
+        let (first, last) = (one[axis][0].max(other[axis][0]), one[axis][1].min(other[axis][1]));
+        i128::from((last - first + 1).max(0))
+    };
+    along(0) * along(1)
 }
 
 fn columns_of(min: [i32; 3], max: [i32; 3]) -> Columns {
@@ -262,16 +281,10 @@ fn columns_of(min: [i32; 3], max: [i32; 3]) -> Columns {
 }
 
 /// Returns whether disjoint regions cover all columns of tiles of a box.
-fn are_covered(tiles: TileBox, regions: &BTreeSet<Columns>) -> bool {
+fn are_covered(tiles: TileBox, regions: &[Columns]) -> bool {
     let wanted = columns_of(tiles.min().to_array(), tiles.max().to_array());
-    let common = |region: &Columns| {
-        let along = |axis: usize| {
-            let (first, last) = (wanted[axis][0].max(region[axis][0]), wanted[axis][1].min(region[axis][1]));
-            i128::from((last - first + 1).max(0))
-        };
-        along(0) * along(1)
-    };
-    regions.iter().map(common).sum::<i128>() >= common(&wanted)
+    regions.iter().map(|region| common_columns(region, &wanted)).sum::<i128>()
+        >= common_columns(&wanted, &wanted)
 }
 
 /// New poses by the number of the scan.
