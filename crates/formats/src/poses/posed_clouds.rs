@@ -295,7 +295,7 @@ impl PosedClouds {
 fn time_after_stamp(point: &CloudPoint) -> i64 {
     match point.is_return {
         // The cast saturates; such times are outside all poses.
-        true if point.time_s.is_finite() => (point.time_s * 1e9).round() as i64,
+        true if point.time_s.is_finite() => ((point.time_s * 1e9).round() as i64).max(NO_TIME + 1),
         true => i64::MAX,
         false => NO_TIME,
     }

@@ -1,8 +1,9 @@
 use super::RigidPose;
+use std::collections::btree_map::Entry;
 use std::collections::{BTreeMap, BTreeSet};
 use voxtile::Result;
 use voxtile::nalgebra::Isometry3;
-use voxtile::scan::{NO_TIME, Pose, Sweep};
+use voxtile::scan::{Pose, Sweep};
 
 /// Periods of a scan in which points were measured, each [`Sweep::PERIOD_NS`] long, counted from the stamp. They decide
 /// at which times the poses of the sensor are needed. A scan may last a tenth of a second or a minute.
@@ -15,6 +16,8 @@ pub struct SweepPeriods {
 
 /// Maximum number of periods: 80 s. It bounds the memory for points with random times.
 const MAX_PERIODS: usize = Sweep::MAX_POSES / 2 - 2;
+/// Points further from the stamp, a day, have wrong times or none.
+const LONGEST_NS: u64 = 86_400_000_000_000;
 /// Accuracy of the time at which the known poses begin or end.
 const EDGE_NS: u64 = 1000;
 
@@ -33,7 +36,7 @@ impl SweepPeriods {
     #[inline]
     pub fn add(&mut self, after_ns: i64) {
         let period = after_ns.div_euclid(Sweep::PERIOD_NS);
-        if self.last != Some(period) && after_ns != NO_TIME {
+        if self.last != Some(period) && after_ns.unsigned_abs() <= LONGEST_NS {
             self.last = Some(period);
             if self.periods.len() < MAX_PERIODS {
                 self.periods.insert(period);
@@ -63,8 +66,8 @@ impl SweepPeriods {
             let begin = period.saturating_mul(Sweep::PERIOD_NS);
             let ends = [begin, begin.saturating_add(Sweep::PERIOD_NS)];
             for end in ends {
-                if !poses.contains_key(&end) {
-                    poses.insert(end, known(end)?);
+                if let Entry::Vacant(entry) = poses.entry(end) {
+                    entry.insert(known(end)?);
                 }
             }
             // The trajectory may begin or end within the period.

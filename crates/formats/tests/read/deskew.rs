@@ -83,7 +83,7 @@ fn assert_deskews(points: &[CloudPoint], pose_at: impl FnMut(i64) -> Option<Rigi
     );
     assert!(points.iter().all(|point| sweep.covers(after_ns(point))), "{of}");
     assert!(skewed_m > 0.3, "{of}: without deskewing, points are only {skewed_m} m off");
-    assert!(deskewed_m < 2e-5, "{of}: {deskewed_m} m off");
+    assert!(deskewed_m < 5e-5, "{of}: {deskewed_m} m off");
 }
 
 /// Creates a pose file with a pose every two milliseconds.
@@ -184,7 +184,7 @@ fn points_far_from_the_stamp_move_and_those_without_a_pose_are_counted() {
     for time_s in known_s {
         let wanted = world_from_sensor(time_s).apply([3.0, 1.0, 0.0]);
         let found = place(time_s);
-        assert!((0..3).all(|k| (found[k] - wanted[k]).abs() < 1e-5), "{time_s} s: {found:?}, not {wanted:?}");
+        assert!((0..3).all(|k| (found[k] - wanted[k]).abs() < 5e-5), "{time_s} s: {found:?}, not {wanted:?}");
     }
     for time_s in unknown_s {
         assert_eq!(place(time_s), [3.0, 1.0, 0.0], "{time_s} s");
