@@ -90,11 +90,11 @@ impl ScanSource for KeptSource {
         pushed?;
         points.set_moving(scan.moving().cloned());
         points.set_sweep(scan.record().sweep.clone());
+        points.set_body_from_sensor(scan.body_from_sensor());
         Ok(scan.world_from_sensor().map(|world_from_sensor| ScanHead {
             name: scan.number().to_string(),
             stamp_ns: scan.stamp_ns(),
             world_from_sensor,
-            body_from_sensor: scan.body_from_sensor(),
         }))
     }
 

@@ -125,13 +125,8 @@ mod tests {
         points_in_sensor.begin(false);
         points_in_sensor.push([number as f64, 0.0, 0.0], 0.0).unwrap();
         let world_from_sensor = Isometry3::identity().into();
-        let scan = StoredScan {
-            name: number.to_string(),
-            stamp_ns: None,
-            points_in_sensor,
-            world_from_sensor,
-            body_from_sensor: None,
-        };
+        let scan =
+            StoredScan { name: number.to_string(), stamp_ns: None, points_in_sensor, world_from_sensor };
         let fingerprint = ScanFingerprint::of(&scan).unwrap();
         ReadScan { scan, fingerprint }
     }

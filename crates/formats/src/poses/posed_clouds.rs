@@ -374,8 +374,8 @@ impl ScanSource for PosedClouds {
             self.has_pose = true;
             let CloudHead { name, stamp_ns, fields, .. } = head;
             self.fields = fields;
-            let body_from_sensor = self.mount();
-            return Ok(Some(ScanHead { name, stamp_ns, world_from_sensor, body_from_sensor }));
+            points.set_body_from_sensor(self.mount());
+            return Ok(Some(ScanHead { name, stamp_ns, world_from_sensor }));
         }
         self.is_at_end = true;
         if self.without_pose > 0 && !self.has_pose && !self.options.may_lack_poses {

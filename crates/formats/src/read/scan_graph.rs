@@ -122,7 +122,7 @@ impl<R: Read> ScanSource for ScanGraph<R> {
         let world_from_sensor = Pose::of_quaternion([x, y, z], [qx, qy, qz, qw])
             .map_err(|reason| FormatError::at_offset(at, reason).in_input(&self.path))?;
         self.is_past_error = false;
-        Ok(Some(ScanHead { name: id.to_string(), stamp_ns: None, world_from_sensor, body_from_sensor: None }))
+        Ok(Some(ScanHead { name: id.to_string(), stamp_ns: None, world_from_sensor }))
     }
 
     fn pass_unread(&mut self) -> bool {

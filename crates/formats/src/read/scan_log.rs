@@ -113,7 +113,7 @@ impl<R: BufRead> ScanSource for ScanLog<R> {
         let Some(world_from_sensor) = std::mem::replace(&mut self.pose, next) else { return Ok(None) };
         let name = self.done.to_string();
         self.done += 1;
-        Ok(Some(ScanHead { name, stamp_ns: None, world_from_sensor, body_from_sensor: None }))
+        Ok(Some(ScanHead { name, stamp_ns: None, world_from_sensor }))
     }
 
     fn fingerprint(&self) -> Result<String> {

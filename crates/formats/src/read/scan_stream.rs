@@ -336,7 +336,7 @@ impl<R: StreamInput> ScanSource for ScanStream<R> {
         let pose = self.pose(pose, pose_at);
         self.is_past_error = pose.is_err();
         let world_from_sensor = pose?;
-        Ok(Some(ScanHead { name, stamp_ns: None, world_from_sensor, body_from_sensor: None }))
+        Ok(Some(ScanHead { name, stamp_ns: None, world_from_sensor }))
     }
 
     fn remarks(&self) -> Vec<String> {

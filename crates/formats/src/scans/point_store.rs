@@ -23,8 +23,6 @@ pub struct PointStore {
     budget: PointBudget,
     /// Marks of moving points, if the source has any.
     moving: Option<Box<MovingMarks>>,
-    /// Motion of the sensor, if points have times.
-    sweep: Option<Arc<Sweep>>,
 }
 
 /// Attributes of the points in memory. They are in a box, because most scans have none.
@@ -35,6 +33,10 @@ struct StoredAttributes {
     lists: PointAttributes,
     /// Maximum number of points in memory, from the budget and the size of a point with its attributes.
     max_points: usize,
+    /// Motion of the sensor, if points have times.
+    sweep: Option<Arc<Sweep>>,
+    /// Pose of the sensor in the body frame, if it is known and another frame.
+    body_from_sensor: Option<[f64; 7]>,
 }
 
 /// Memory limit for the points of a scan, and the folder for the others.
@@ -98,10 +100,11 @@ impl PointBudget {
 impl PointStore {
     /// Creates an empty store.
     pub fn new(budget: PointBudget) -> Self {
-        let (set, lists) = Default::default();
-        let attributes = StoredAttributes { set, lists, max_points: budget.max_points(RECORD_BYTES) };
-        let (points, intensities, filed, file, moving, sweep) = Default::default();
-        Self { points, intensities, attributes: Box::new(attributes), filed, file, budget, moving, sweep }
+        let (set, lists, sweep, body_from_sensor) = Default::default();
+        let max_points = budget.max_points(RECORD_BYTES);
+        let attributes = StoredAttributes { set, lists, max_points, sweep, body_from_sensor };
+        let (points, intensities, filed, file, moving) = Default::default();
+        Self { points, intensities, attributes: Box::new(attributes), filed, file, budget, moving }
     }
 
     /// Removes all points and sets whether the next ones have intensities. They have no attributes.
@@ -116,7 +119,8 @@ impl PointStore {
         self.attributes.lists.clear();
         self.attributes.set = attributes;
         self.attributes.max_points = self.budget.max_points(self.record_bytes());
-        (self.filed, self.file, self.moving, self.sweep) = (0, None, None, None);
+        (self.attributes.sweep, self.attributes.body_from_sensor) = (None, None);
+        (self.filed, self.file, self.moving) = (0, None, None);
     }
 
     /// Sets the marks of all points, after the last point.
@@ -131,12 +135,23 @@ impl PointStore {
 
     /// Sets the motion of the sensor, after the last point, for points with times.
     pub fn set_sweep(&mut self, sweep: Option<Arc<Sweep>>) {
-        self.sweep = sweep;
+        self.attributes.sweep = sweep;
+    }
+
+    /// Sets the pose of the sensor in the body frame that the trajectory describes, if it is another frame: position in
+    /// metres, then quaternion x, y, z, w.
+    pub fn set_body_from_sensor(&mut self, body_from_sensor: Option<[f64; 7]>) {
+        self.attributes.body_from_sensor = body_from_sensor;
+    }
+
+    /// Returns the pose of the sensor in the body frame, if it is known and another frame.
+    pub fn body_from_sensor(&self) -> Option<[f64; 7]> {
+        self.attributes.body_from_sensor
     }
 
     /// Returns the motion of the sensor, if points have times.
     pub fn sweep(&self) -> Option<&Arc<Sweep>> {
-        self.sweep.as_ref()
+        self.attributes.sweep.as_ref()
     }
 
     pub(crate) fn budget(&self) -> &PointBudget {
@@ -347,8 +362,8 @@ impl PointStore {
 
     /// Returns points in the sensor frame at the stamp, intensities and attributes without times, if all are in memory.
     pub(crate) fn into_parts(self) -> (Vec<Point>, Option<Vec<f32>>, PointAttributes) {
-        let Self { mut points, intensities, attributes, sweep, .. } = self;
-        let mut attributes = attributes.lists;
+        let Self { mut points, intensities, attributes, .. } = self;
+        let StoredAttributes { lists: mut attributes, sweep, .. } = *attributes;
         if let Some(sweep) = sweep {
             let mut to_stamp = sweep.to_stamp();
             for (point, time_ns) in points.iter_mut().zip(&attributes.times_ns) {

@@ -217,7 +217,6 @@ mod tests {
             stamp_ns: None,
             points_in_sensor,
             world_from_sensor: Isometry3::translation(x_m, 0.0, 0.0).into(),
-            body_from_sensor: None,
         }
     }
 

@@ -179,6 +179,7 @@ impl SelectedScans {
         )?;
         points.set_moving(marks.map(|(_, taken)| taken.finish()));
         points.set_sweep(self.unfiltered.sweep().cloned());
+        points.set_body_from_sensor(self.unfiltered.body_from_sensor());
         self.unfiltered = PointStore::default();
         outcome?;
         Ok(head)

@@ -14,9 +14,6 @@ pub struct ScanHead {
     pub stamp_ns: Option<i64>,
     /// Pose of the sensor: `world = R * p + t`.
     pub world_from_sensor: Pose,
-    /// Pose of the sensor in the body frame that the trajectory describes, if it is another frame: position in metres, then
-    /// quaternion x, y, z, w.
-    pub body_from_sensor: Option<[f64; 7]>,
 }
 
 /// Source of scans, read one at a time in order.
@@ -53,12 +50,11 @@ pub trait ScanSource {
     fn next_stored(&mut self, budget: &PointBudget) -> Result<Option<StoredScan>> {
         let mut points_in_sensor = PointStore::new(budget.clone());
         let head = self.read_scan(&mut points_in_sensor)?;
-        Ok(head.map(|ScanHead { name, stamp_ns, world_from_sensor, body_from_sensor }| StoredScan {
+        Ok(head.map(|ScanHead { name, stamp_ns, world_from_sensor }| StoredScan {
             name,
             stamp_ns,
             points_in_sensor,
             world_from_sensor,
-            body_from_sensor,
         }))
     }
 

@@ -19,9 +19,6 @@ pub struct StoredScan {
     pub points_in_sensor: PointStore,
     /// Pose of the sensor: `world = R * p + t`.
     pub world_from_sensor: Pose,
-    /// Pose of the sensor in the body frame that the trajectory describes, if it is another frame: position in metres, then
-    /// quaternion x, y, z, w.
-    pub body_from_sensor: Option<[f64; 7]>,
 }
 
 impl ScanPoints for StoredScan {
@@ -97,6 +94,6 @@ impl ScanPoints for StoredScan {
     }
 
     fn body_from_sensor(&self) -> Option<[f64; 7]> {
-        self.body_from_sensor
+        self.points_in_sensor.body_from_sensor()
     }
 }

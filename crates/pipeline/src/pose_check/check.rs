@@ -325,13 +325,7 @@ mod tests {
             scan(number).into_iter().for_each(|point| points_in_sensor.push(point, 0.0).unwrap());
             let world_from_sensor = Pose::from_quaternion(pose.position_m, pose.quaternion).unwrap();
             let stamp_ns = Some(1_000_000_000 * every_s * number as i64);
-            let scan = StoredScan {
-                name: String::new(),
-                stamp_ns,
-                points_in_sensor,
-                world_from_sensor,
-                body_from_sensor: None,
-            };
+            let scan = StoredScan { name: String::new(), stamp_ns, points_in_sensor, world_from_sensor };
             doubt = doubt.or(check.take(&scan).unwrap());
         }
         doubt.or(check.finish().unwrap()).map(|doubt| doubt.remark())
@@ -419,13 +413,7 @@ mod tests {
         points_in_sensor.begin(false);
         (0..3 * MAX_POINTS + 5).for_each(|k| points_in_sensor.push([k as f64, 0.0, 0.0], 0.0).unwrap());
         let world_from_sensor = Pose::identity();
-        let scan = StoredScan {
-            name: String::new(),
-            stamp_ns: None,
-            points_in_sensor,
-            world_from_sensor,
-            body_from_sensor: None,
-        };
+        let scan = StoredScan { name: String::new(), stamp_ns: None, points_in_sensor, world_from_sensor };
         let points = sample(&scan).unwrap();
         assert!(points.iter().enumerate().all(|(k, point)| point[0] == 4.0 * k as f32), "{}", points.len());
         assert!(points.len() <= MAX_POINTS && points.len() > MAX_POINTS / 2);
