@@ -1,4 +1,4 @@
-use super::grid::Grid;
+use super::grid::{Grid, Steps};
 use super::pinhole::Pinhole;
 use super::planes::{BlockInput, PlaneReader, PlaneWriter};
 use super::words::{Width, unzigzag, zigzag};
@@ -13,8 +13,9 @@ pub(super) enum Form {
     Bits(Width),
     /// Differences from the value a given number of points before.
     Differences(Width, u8),
-    /// For values that are multiples of a step: differences between consecutive multiples. A second list contains the
-    /// deviations of values from their multiples, in units in the last place.
+    /// For values of which most are multiples of a step: differences between consecutive multiples. A second list
+    /// contains the deviations of values from their multiples, in units in the last place, a third one the values that
+    /// are on no multiple.
     Steps(Width, Grid),
     /// For coordinates of a depth image: differences between each pixel and its prediction.
     Pixels(Arc<Pinhole>),
@@ -25,6 +26,8 @@ const DIFFERENCES: u8 = 1;
 const STEPS: u8 = 2;
 const PARTS: u8 = 3;
 const PIXELS: u8 = 4;
+const UNIT_STEPS: u8 = 5;
+const UNIT_PARTS: u8 = 6;
 const IS_WIDE: u8 = 0x80;
 
 /// Distances in the list between points with similar values: 1 for neighbours; 2 and 4 for sensors whose beams fire in
@@ -34,6 +37,10 @@ const LAGS: [u8; 3] = [1, 2, 4];
 const SAMPLE_SIZE: usize = 1 << 14;
 /// Number of consecutive blocks that reuse a form before other forms are tried again.
 const BLOCKS_ALIKE: u32 = 32;
+/// Deviation that stands for a value that is on no multiple of a step.
+const OFF_GRID: i8 = i8::MIN;
+/// One in this many values at most may be off the grid.
+const MIN_VALUES_PER_OFF_GRID: usize = 16;
 /// Number of columns whose forms are remembered.
 const COLUMNS: usize = 4;
 
@@ -41,7 +48,8 @@ const COLUMNS: usize = 4;
 pub(super) struct ColumnWriter {
     planes: PlaneWriter,
     words: Vec<u64>,
-    apart: Vec<u64>,
+    apart: Vec<u8>,
+    off_grid: Vec<u64>,
     sample: Vec<u8>,
     /// Form of each column's last block, and the number of blocks before it with the same form.
     chosen: [Option<(Form, u32)>; COLUMNS],
@@ -117,8 +125,9 @@ impl ColumnWriter {
         self.sample.clear();
         let bytes = bytes_of(form, &self.words);
         self.planes.put(&self.words, bytes, &mut self.sample)?;
-        if let Form::Steps(..) = form {
-            self.planes.put(&self.apart, 1, &mut self.sample)?;
+        if let Form::Steps(width, _) = form {
+            self.planes.put_bytes(&self.apart, &mut self.sample)?;
+            self.planes.put(&self.off_grid, width.bytes(), &mut self.sample)?;
         }
         Ok(self.sample.len())
     }
@@ -139,12 +148,16 @@ impl ColumnWriter {
             &Form::Bits(width) => out.push(BITS | flag_of(width)),
             &Form::Differences(width, lag) => out.extend([DIFFERENCES | flag_of(width), lag]),
             &Form::Steps(width, grid) => {
-                let (kind, number) = match grid {
-                    Grid::Times(step) => (STEPS, step),
-                    Grid::Over(parts) => (PARTS, parts),
+                let is_in_metres = grid.unit == 1.0;
+                let (kind, number) = match grid.steps {
+                    Steps::Times(step) => (if is_in_metres { STEPS } else { UNIT_STEPS }, step),
+                    Steps::Over(parts) => (if is_in_metres { PARTS } else { UNIT_PARTS }, parts),
                 };
                 out.push(kind | flag_of(width));
                 out.extend(number.to_le_bytes());
+                if !is_in_metres {
+                    out.extend(grid.unit.to_le_bytes());
+                }
                 out.push(bytes as u8);
             }
             Form::Pixels(camera) => {
@@ -155,8 +168,9 @@ impl ColumnWriter {
             }
         }
         self.planes.put(&self.words, bytes, out)?;
-        if matches!(form, Form::Steps(..)) {
-            self.planes.put(&self.apart, 1, out)?;
+        if let Form::Steps(width, _) = form {
+            self.planes.put_bytes(&self.apart, out)?;
+            self.planes.put(&self.off_grid, width.bytes(), out)?;
         }
         Ok(true)
     }
@@ -178,13 +192,18 @@ impl ColumnWriter {
             Form::Steps(width, _) if !width.has(values) => return false,
             &Form::Steps(width, grid) => {
                 self.apart.clear();
+                self.off_grid.clear();
                 let mut before = 0;
                 for value in values {
-                    let Some((steps, apart)) = grid.place(*value, width) else { return false };
+                    let (steps, apart) = grid.place(*value, width).unwrap_or_else(|| {
+                        self.off_grid.push(width.bits(*value));
+                        (before, OFF_GRID)
+                    });
                     words.push(zigzag(steps - before));
-                    self.apart.push(u64::from(apart as u8));
+                    self.apart.push(apart as u8);
                     before = steps;
                 }
+                return self.off_grid.len() <= values.len() / MIN_VALUES_PER_OFF_GRID;
             }
             Form::Pixels(camera) => return camera.words(values, depths.unwrap_or_default(), words),
         }
@@ -211,7 +230,7 @@ fn bytes_of(form: &Form, words: &[u64]) -> usize {
 pub(super) struct ColumnReader {
     planes: PlaneReader,
     words: Vec<u64>,
-    apart: Vec<u64>,
+    apart: Vec<u8>,
     /// Camera of the last column that was stored as pixels.
     camera: Option<Pinhole>,
 }
@@ -259,19 +278,32 @@ impl ColumnReader {
                 }
                 values.extend(self.words.iter().map(|word| width.value(width.unordered(*word))));
             }
-            kind @ (STEPS | PARTS) => {
+            kind @ (STEPS | PARTS | UNIT_STEPS | UNIT_PARTS) => {
                 let number = input.double()?;
-                let grid = if kind == STEPS { Grid::Times(number) } else { Grid::Over(number) };
+                let is_times = matches!(kind, STEPS | UNIT_STEPS);
+                let steps = if is_times { Steps::Times(number) } else { Steps::Over(number) };
+                let unit = if matches!(kind, STEPS | PARTS) { 1.0 } else { input.double()? };
+                let grid = Grid { steps, unit };
                 let bytes = word_bytes(input)?;
                 self.planes.take(&mut self.words, bytes, input)?;
                 self.apart.clear();
                 self.apart.resize(points, 0);
-                self.planes.take(&mut self.apart, 1, input)?;
+                self.planes.take_bytes(&mut self.apart, input)?;
                 let mut steps = 0_i64;
                 values.extend(self.words.iter().zip(&self.apart).map(|(word, apart)| {
                     steps = steps.wrapping_add(unzigzag(*word));
-                    grid.value_at(steps, *apart as u8 as i8, width)
+                    grid.value_at(steps, *apart as i8, width)
                 }));
+                // Blocks of version 1 have no such values.
+                let is_off = |apart: &u8| *apart as i8 == OFF_GRID;
+                let off_grid = self.apart.iter().filter(|apart| is_off(apart)).count();
+                if off_grid > 0 {
+                    self.words.truncate(off_grid);
+                    self.planes.take(&mut self.words, width.bytes(), input)?;
+                    let places = values.iter_mut().zip(&self.apart);
+                    let off = places.filter(|(_, apart)| is_off(apart));
+                    off.zip(&self.words).for_each(|((value, _), bits)| *value = width.value(*bits));
+                }
             }
             PIXELS => {
                 let (focal, center) = (input.double()?, input.double()?);

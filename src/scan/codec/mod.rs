@@ -31,8 +31,8 @@ const MAX_POINTS: usize = 1 << 16;
 /// Upper bound on the size of a block: twice the size of its points in memory.
 pub(crate) const MAX_BLOCK_BYTES: usize = 2 * MAX_POINTS * (size_of::<Point>() + size_of::<f32>());
 
-/// First byte of a block.
-const VERSION: u8 = 1;
+/// First byte of a block. Version 1 has no grids in feet and no values off a grid.
+const VERSION: u8 = 2;
 
 // Columns of a block besides the coordinates.
 const INTENSITIES: u8 = 1;

@@ -19,8 +19,9 @@ const MIN_GROUP: usize = 1024;
 const TABLE_BYTES: f64 = 80.0;
 /// Entropy in bits per byte above which bytes are stored uncompressed.
 const NOISE_BITS: f64 = 7.85;
-/// Number of sampled bytes for detecting noise.
-const SAMPLE_SIZE: usize = 2048;
+/// Number of consecutive bytes in a part of a sample, and maximum number of parts, evenly distributed over the plane.
+const PART: usize = 1024;
+const PARTS: usize = 8;
 
 /// Writes words as planes of bytes, the most significant first.
 #[derive(Default)]
@@ -35,6 +36,11 @@ pub(super) struct PlaneWriter {
 }
 
 impl PlaneWriter {
+    /// Appends single bytes.
+    pub(super) fn put_bytes(&mut self, bytes: &[u8], out: &mut Vec<u8>) -> io::Result<()> {
+        self.put_plane(bytes, None, out)
+    }
+
     pub(super) fn put(&mut self, words: &[u64], bytes: usize, out: &mut Vec<u8>) -> io::Result<()> {
         let (mut plane, mut above) = (std::mem::take(&mut self.plane), std::mem::take(&mut self.above));
         // Transposing words of half the width takes half the time.
@@ -59,29 +65,19 @@ impl PlaneWriter {
 
     fn put_plane(&mut self, plane: &[u8], above: Option<&[u8]>, out: &mut Vec<u8>) -> io::Result<()> {
         let Some(&first) = plane.first() else { return Ok(()) };
-        let noise_bits = |bytes: usize| NOISE_BITS * bytes as f64;
-        if above.is_none() && plane.len() > 2 * SAMPLE_SIZE {
-            // A part of the plane suffices to detect noise.
-            let part = &plane[..SAMPLE_SIZE];
-            if entropy(&histogram(part), SAMPLE_SIZE as u32) > noise_bits(SAMPLE_SIZE) {
-                out.push(STORED);
-                out.extend_from_slice(plane);
-                return Ok(());
-            }
-        }
-        let counts = histogram(plane);
-        if counts[usize::from(first)] as usize == plane.len() {
+        if plane.iter().fold(0, |others, byte| others | (byte ^ first)) == 0 {
             out.extend([CONSTANT, first]);
             return Ok(());
         }
-        let bits = entropy(&counts, plane.len() as u32);
+        let bits = sampled_entropy(plane);
+        let noise_bits = NOISE_BITS * plane.len() as f64;
         if let Some((above, groups)) = above.map(|above| (above, Groups::of(above)))
-            && self.bits_by_group(plane, above, &groups) < bits.min(noise_bits(plane.len()))
+            && self.bits_by_group(plane, above, &groups) < bits.min(noise_bits)
         {
             out.push(GROUPED);
             return self.put_groups(plane, above, &groups, out);
         }
-        if bits < noise_bits(plane.len()) {
+        if bits < noise_bits {
             let length = self.compress(plane)?;
             if length < plane.len() {
                 out.push(COMPRESSED);
@@ -198,6 +194,18 @@ fn histogram(plane: &[u8]) -> [u32; 256] {
     std::array::from_fn(|byte| counts.iter().map(|counts| counts[byte]).sum())
 }
 
+/// Estimates the total entropy in bits from a sample.
+fn sampled_entropy(plane: &[u8]) -> f64 {
+    let chunks = plane.len().div_ceil(PART);
+    let mut counts = [0; 256];
+    let mut all = 0;
+    for part in plane.chunks(PART).step_by(chunks.div_ceil(PARTS).max(1)) {
+        counts.iter_mut().zip(histogram(part)).for_each(|(all, of_part)| *all += of_part);
+        all += part.len();
+    }
+    entropy(&counts, all as u32) * plane.len() as f64 / all as f64
+}
+
 /// Total entropy in bits.
 fn entropy(counts: &[u32], all: u32) -> f64 {
     let all = f64::from(all);
@@ -234,6 +242,19 @@ impl PlaneReader {
             std::mem::swap(&mut self.plane, &mut self.above);
         }
         Ok(())
+    }
+
+    /// Reads single bytes; replaces the content of the list, but keeps its length.
+    pub(super) fn take_bytes(
+        &mut self,
+        bytes: &mut Vec<u8>,
+        input: &mut BlockInput<'_>,
+    ) -> Result<(), FormatError> {
+        std::mem::swap(&mut self.plane, bytes);
+        self.above.clear();
+        let taken = self.take_plane(input);
+        std::mem::swap(&mut self.plane, bytes);
+        taken
     }
 
     fn take_plane(&mut self, input: &mut BlockInput<'_>) -> Result<(), FormatError> {

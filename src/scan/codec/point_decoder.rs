@@ -29,7 +29,7 @@ impl PointDecoder {
         attributes: &mut PointAttributes,
     ) -> Result<bool, FormatError> {
         let mut input = BlockInput::new(block);
-        if input.byte()? != VERSION {
+        if !(1..=VERSION).contains(&input.byte()?) {
             return Err(input.wrong("a block of points of a newer version"));
         }
         let set = input.byte()?;

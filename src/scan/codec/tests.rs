@@ -85,6 +85,81 @@ fn values_on_a_grid_are_stored_as_integers() {
     assert!(a_point(&narrow) < 11.0, "{}", a_point(&narrow));
 }
 
+/// The international foot, the US survey foot, and its usual rounding.
+const FEET_M: [f64; 3] = [0.3048, 1200.0 / 3937.0, 0.304_800_609_6];
+
+/// Points of a survey in feet, as readers convert them to metres.
+fn survey_in_feet(points: usize, foot_m: f64, state: &mut u64) -> Vec<Point> {
+    let in_feet = |point: Point, axis: usize| {
+        ((point[axis] * 328.0).round() * 0.01 + [1_640_416.0, 638_000.5, 420.25][axis]) * foot_m
+    };
+    turn(points, state).into_iter().map(|point| std::array::from_fn(|axis| in_feet(point, axis))).collect()
+}
+
+#[test]
+fn values_in_feet_are_stored_as_integers() {
+    let points = 30_000;
+    for foot_m in FEET_M {
+        let a_point = round_trip(&survey_in_feet(points, foot_m, &mut 5), None) as f64 / points as f64;
+        assert!(a_point < 5.0, "{a_point} bytes a point");
+    }
+}
+
+#[test]
+fn a_value_off_the_grid_leaves_the_others_on_it() {
+    let (points, state) = (30_000, &mut 6);
+    let odd =
+        [f64::NAN, f64::INFINITY, -0.0, 5e-324, 1e300, 0.123_456_789, f64::from_bits(0x7ff0_0000_0000_0001)];
+    let narrow_odd = [f32::NAN, f32::NEG_INFINITY, -0.0, 1e-45, f32::MAX, 0.123_456_79].map(f64::from);
+    let wide: Vec<Point> =
+        turn(points, state).iter().map(|point| point.map(|x| (x * 1e3).round() * 1e-3)).collect();
+    let narrow = wide.iter().map(|point| point.map(|x| f64::from(x as f32))).collect();
+    for (mut grid, odd) in [(wide, &odd[..]), (narrow, &narrow_odd)] {
+        let without = round_trip(&grid, None);
+        for at in (7..points).step_by(300) {
+            grid[at][at % 3] = odd[at % odd.len()];
+        }
+        let with = round_trip(&grid, None);
+        assert!(with < without + points / 30, "{without} bytes, then {with}");
+        // Points without a return, as some drivers write them.
+        for at in (0..points).step_by(20) {
+            grid[at] = [f64::from(f32::NAN); 3];
+        }
+        let with = round_trip(&grid, None);
+        assert!(with < without + points, "{without} bytes, then {with}");
+        // Most values are off the grid.
+        for at in (0..points).filter(|at| at % 5 > 0) {
+            grid[at] = [0; 3].map(|_| unit(state));
+        }
+        round_trip(&grid, None);
+    }
+}
+
+#[test]
+fn blocks_of_version_1_are_read() {
+    // Five points: x as differences of `f64`, y of `f32`, z as integers of a grid; intensities.
+    let block = "010105810100807f007f8000009e33d10a00002b335ff80000e23315af0000be33f18a00002b335ff80000e23315af00\
+                 00be32f18c830000000000408f400200090000000000c4020202020200030000000000002440010000060606060200030\
+                 000000000001040010008080b033a0200";
+    let digits: Vec<u8> =
+        block.bytes().filter_map(|byte| (byte as char).to_digit(16)).map(|x| x as u8).collect();
+    let block: Vec<u8> = digits.chunks(2).map(|pair| pair[0] << 4 | pair[1]).collect();
+    let point = |k: f64| {
+        let z = if k == 3.0 { -0.0 } else { 0.1 * k + k * k / 7.0 };
+        [1.25 + k * 0.001, f64::from((0.3 * k) as f32), z]
+    };
+    let (mut points, mut intensities) = (Vec::new(), Vec::new());
+    PointDecoder::default()
+        .decode(&block, &mut points, &mut intensities, &mut PointAttributes::default())
+        .unwrap();
+    let wanted: Vec<Point> = (0..5).map(|k| point(f64::from(k))).collect();
+    assert_eq!(
+        points.iter().map(|x| x.map(f64::to_bits)).collect::<Vec<_>>(),
+        wanted.iter().map(|x| x.map(f64::to_bits)).collect::<Vec<_>>()
+    );
+    assert_eq!(intensities, [1.0, 2.0, 0.5, 0.0, 7.25]);
+}
+
 #[test]
 fn depth_images_are_stored_as_pixels() {
     for (focal, center) in [([585.0, 585.0], [320.0, 240.0]), ([517.3, 516.5], [318.6, 255.3])] {
@@ -107,7 +182,10 @@ fn damaged_blocks_are_errors_or_points() {
     let turn = turn(3000, &mut 4);
     let intensities: Vec<f32> = (0..3000).map(|k| (k % 97) as f32).collect();
     let grid: Vec<Point> = turn.iter().map(|point| point.map(|x| (x * 1e3).round() * 1e-3)).collect();
-    for scan in [&turn, &grid] {
+    let feet = survey_in_feet(3000, FEET_M[1], &mut 8);
+    let mut some_off = grid.clone();
+    some_off.iter_mut().step_by(40).for_each(|point| *point = [f64::NAN; 3]);
+    for scan in [&turn, &grid, &feet, &some_off] {
         let block = encoded(scan, Some(&intensities));
         let decode = |block: &[u8]| {
             let (mut points, mut of_points) = (Vec::new(), Vec::new());
@@ -132,6 +210,7 @@ fn number() -> impl Strategy<Value = f64> {
         any::<u64>().prop_map(f64::from_bits),
         any::<u32>().prop_map(|bits| f64::from(f32::from_bits(bits))),
         (-100_000_i32..100_000).prop_map(|steps| f64::from(steps) * 0.001),
+        (-100_000_i32..100_000).prop_map(|steps| f64::from(steps) * 0.01 * 0.3048),
         (-100.0..100.0_f64),
         prop::sample::select(vec![0.0, -0.0, f64::NAN, f64::INFINITY, f64::MIN_POSITIVE, 5e-324, f64::MAX]),
     ]
@@ -153,7 +232,7 @@ proptest! {
 
     #[test]
     fn any_bytes_decode_to_an_error_or_points(bytes in prop::collection::vec(any::<u8>(), 0..200)) {
-        let mut block = vec![1, 1];
+        let mut block = vec![VERSION, 1];
         block.extend(&bytes);
         let (mut points, mut intensities) = (Vec::new(), Vec::new());
         let _ = PointDecoder::default().decode(&block, &mut points, &mut intensities, &mut PointAttributes::default());
@@ -177,6 +256,8 @@ fn print_sizes_and_times_of_real_sets() {
         "las_large_coords/lone-star.laz",
         "las_large_coords/lidR_Megaplot.laz",
         "las_large_coords/autzen_trim.laz",
+        "las_large_coords/pdal_4_6_crop.las",
+        "kitti_0001_a",
     ] {
         let poses = set.ends_with("laz").then(|| "identity".into());
         let options = ReadOptions { poses, ..ReadOptions::default() };
