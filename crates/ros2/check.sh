@@ -4,8 +4,8 @@
 # hostile peer. Outputs must equal those of `voxtile export`; services are also called. Passes with a message if Python
 # or PyPI is missing. The test `rclpy` uses ROS 2 itself: rclpy of Jazzy over Fast DDS, from PyPI (for Python 3.11).
 #
-# check.sh [friendly] [hostile] [types] [variants] [odometry] [launch] [path] [layers] [real] [sensors] [flood]
-#          [monitoring] [rclpy] [zenoh] [sizes]
+# check.sh [friendly] [hostile] [types] [variants] [odometry] [launch] [path] [layers] [deskew] [real] [sensors]
+#          [flood] [monitoring] [rclpy] [zenoh] [sizes]
 #
 # sizes, only when named, prints how long clients of each middleware wait for messages of up to 50 MB.
 #
@@ -81,6 +81,7 @@ play() {
     odometry) start --resolution $resolution $outputs --odometry /odom --frame-id odom ;;
     path) start --resolution $resolution --max-range 60 --publish-every 0.2 --path /slam_path --flush-every 2 ;;
     layers) start --resolution $resolution --max-range 60 --layers $layers --publish-every 0.2 ;;
+    deskew) start --resolution $resolution --max-range 60 --deskew --keep-scans ;;
     sensors) start --resolution $resolution $outputs --cloud /cloud_in --cloud /rear ;;
     launch)
         # Starts the node as `ros2 launch` does, with a namespace, a name, parameters and remappings.
@@ -235,7 +236,7 @@ sizes() {
 
 # Folder of real clouds, if available.
 street=${VOXTILE_DATA:-../shared/data}/mulran_riverside02_a
-for kind in ${*:-friendly hostile types variants odometry launch path layers real sensors flood monitoring rclpy zenoh}; do
+for kind in ${*:-friendly hostile types variants odometry launch path layers deskew real sensors flood monitoring rclpy zenoh}; do
     map=$work/$kind count=30 resolution=0.1 seconds=12
     if [ $kind = zenoh ] || [ $kind = rclpy ] || [ $kind = sizes ]; then
         $kind
@@ -286,6 +287,7 @@ for kind in ${*:-friendly hostile types variants odometry launch path layers rea
         ;;
     odometry) built_of -o "$map.built" --odometry /odom ;;
     layers) built_of -o "$map.built" --layers $layers ;;
+    deskew) built_of -o "$map.built" --deskew --keep-scans ;;
     path)
         # The path covers only the first clouds; later ones keep their poses.
         built_of -o "$map.built" --keep-scans --count $count
@@ -308,6 +310,15 @@ for kind in ${*:-friendly hostile types variants odometry launch path layers rea
         [ "$of_node" = "$of_bag" ] || fail "the layers of the node differ: $of_node, not $of_bag"
         "$voxtile" export "$map" -o "$map.csv" >/dev/null
         "$python" crates/ros2/tests/outputs.py colours "$work/$kind.outputs" "$map.csv" || fail "the colours differ"
+        echo "$kind: $of_node"
+        continue
+    fi
+    if [ $kind = deskew ]; then
+        of_node=$("$voxtile" digest --scans "$map") of_bag=$("$voxtile" digest --scans "$map.built")
+        [ "$of_node" = "$of_bag" ] || fail "the kept scans of the node differ: $of_node, not $of_bag"
+        built_of -o "$map.skewed"
+        [ "$("$voxtile" digest "$map.skewed")" != "$("$voxtile" digest "$map")" ] || fail "deskewing has no effect"
+        grep -q '1 cloud deskewed in part' "$work/$kind.log" || fail "the last cloud has all transforms"
         echo "$kind: $of_node"
         continue
     fi

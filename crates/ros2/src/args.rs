@@ -71,6 +71,10 @@ pub struct Args {
     #[arg(long, value_name = "S", default_value = "0.5", value_parser = seconds, allow_negative_numbers = true)]
     #[serde(serialize_with = "as_seconds", deserialize_with = "seconds_of")]
     pub pose_tolerance: Duration,
+    /// Correct points for the motion of the sensor during a cloud, by the times of points in its fields. A cloud waits for
+    /// transforms up to its last point
+    #[arg(long)]
+    pub deskew: bool,
 
     /// Voxel size of a new map
     #[arg(long, value_name = "M", default_value_t = 0.05)]

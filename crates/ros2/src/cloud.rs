@@ -1,5 +1,6 @@
 use crate::cloud_poses::CloudPoses;
 use std::time::Instant;
+use voxtile_formats::SweepPeriods;
 
 /// A `sensor_msgs/PointCloud2` that waits for its pose. Its points are still encoded as CDR.
 #[derive(Clone, Debug)]
@@ -12,6 +13,8 @@ pub struct Cloud {
     /// Additional memory of the decoded points.
     pub points_bytes: usize,
     pub arrived: Instant,
+    /// Periods in which its points were measured, if it is deskewed.
+    pub periods: Option<SweepPeriods>,
     /// Poses, if they were looked up before mapping.
     pub poses: Option<CloudPoses>,
 }

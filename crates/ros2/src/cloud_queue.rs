@@ -142,7 +142,16 @@ mod tests {
 
     fn cloud(topic: usize, stamp_ns: i64) -> Cloud {
         let (frame, cdr) = (String::new(), vec![0; 744]);
-        Cloud { topic, stamp_ns, frame, cdr, points_bytes: 0, arrived: Instant::now(), poses: None }
+        Cloud {
+            topic,
+            stamp_ns,
+            frame,
+            cdr,
+            points_bytes: 0,
+            arrived: Instant::now(),
+            periods: None,
+            poses: None,
+        }
     }
 
     fn stamps(queue: &mut CloudQueue) -> Vec<i64> {

@@ -10,9 +10,13 @@ use crate::transport::Message;
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 use voxtile::scan::AttributeSet;
+use voxtile_formats::SweepPeriods;
 use voxtile_formats::read::AttributeValues;
 use voxtile_formats::ros::messages::{Header, MessageKind, PointCloud2, StampedPose, decode_poses};
 use voxtile_formats::ros::{Wire, WireError};
+
+/// Memory of a period of a cloud: the period, and two poses.
+const BYTES_OF_PERIOD: usize = 128;
 
 /// Messages from the transport threads for the mapping thread.
 #[derive(Debug)]
@@ -34,6 +38,7 @@ struct State {
     fixed_frame: String,
     /// Attributes of points that the map takes.
     attributes: AttributeSet,
+    is_deskewed: bool,
     is_closed: bool,
 }
 
@@ -53,6 +58,7 @@ impl Inbox {
             path: None,
             fixed_frame,
             attributes: AttributeSet::NONE,
+            is_deskewed: args.deskew,
             is_closed: false,
         };
         Self { state: Mutex::new(state), changed: Condvar::new() }
@@ -64,14 +70,17 @@ impl Inbox {
     }
 
     pub fn put_cloud(&self, topic: usize, cdr: Vec<u8>) {
-        let attributes = self.lock().attributes;
-        let head = head(&cdr, attributes);
+        let (attributes, is_deskewed) = {
+            let state = self.lock();
+            (state.attributes, state.is_deskewed)
+        };
+        let head = head(&cdr, attributes, is_deskewed);
         let mut state = self.lock();
         state.counters.received += 1;
         if let Some((_, arrived)) = state.arrived.get_mut(topic) {
             *arrived += 1;
         }
-        let (header, points_bytes) = match head {
+        let CloudFacts { header, points_bytes, periods } = match head {
             Ok(head) => head,
             Err(error) => {
                 state.counters.malformed += 1;
@@ -80,8 +89,16 @@ impl Inbox {
             }
         };
         let (stamp_ns, frame) = (header.stamp_ns, header.frame_id);
-        let mut cloud =
-            Cloud { topic, stamp_ns, frame, cdr, points_bytes, arrived: Instant::now(), poses: None };
+        let mut cloud = Cloud {
+            topic,
+            stamp_ns,
+            frame,
+            cdr,
+            points_bytes,
+            arrived: Instant::now(),
+            periods,
+            poses: None,
+        };
         while state.queue.must_wait(&cloud) && !state.is_closed {
             state = self.changed.wait(state).unwrap_or_else(PoisonError::into_inner);
         }
@@ -223,8 +240,16 @@ impl Inbox {
     }
 }
 
-/// Returns the header of a complete cloud and the memory of its decoded points.
-fn head(cdr: &[u8], attributes: AttributeSet) -> Result<(Header, usize), WireError> {
+/// What is known of a cloud before it is mapped.
+struct CloudFacts {
+    header: Header,
+    /// Memory of its decoded points and periods.
+    points_bytes: usize,
+    periods: Option<SweepPeriods>,
+}
+
+/// Returns the facts of a complete cloud.
+fn head(cdr: &[u8], attributes: AttributeSet, is_deskewed: bool) -> Result<CloudFacts, WireError> {
     let mut cloud = PointCloud2::decode(Wire::Cdr, cdr)?;
     cloud.read_attributes(attributes, AttributeValues::default());
     // No transform can match an empty frame, and later clouds of the topic would wait behind this one.
@@ -233,7 +258,15 @@ fn head(cdr: &[u8], attributes: AttributeSet) -> Result<(Header, usize), WireErr
     }
     match cloud.shortage() {
         Some(shortage) => Err(shortage),
-        None => Ok((cloud.header.clone(), CloudPoints::bytes_of(&cloud))),
+        None => {
+            let mut periods = (is_deskewed && cloud.has_times()).then(SweepPeriods::default);
+            if let Some(periods) = &mut periods {
+                cloud.points().for_each(|point| periods.add(point.after_stamp_ns()));
+            }
+            let of_periods = periods.as_ref().map_or(0, |periods| periods.len() * BYTES_OF_PERIOD);
+            let points_bytes = CloudPoints::bytes_of(&cloud, periods.is_some()).saturating_add(of_periods);
+            Ok(CloudFacts { header: cloud.header.clone(), points_bytes, periods })
+        }
     }
 }
 

@@ -1,29 +1,24 @@
-use voxtile_formats::RigidPose;
-
 /// Minimum and maximum of each coordinate in the map frame. Points outside are ignored, as in octomap_server: they are
 /// neither hits nor free space.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PointLimits(pub [[f64; 2]; 3]);
 
 impl PointLimits {
-    /// Replaces points outside by the sensor's origin, which means no return.
-    pub fn apply(&self, positions_m: &mut [[f64; 3]], world_from_sensor: &RigidPose) {
-        let Self(limits_m) = self;
-        if *limits_m == [[f64::NEG_INFINITY, f64::INFINITY]; 3] {
-            return;
-        }
-        for position_m in positions_m {
-            let in_map_m = world_from_sensor.apply(*position_m);
-            if !in_map_m.iter().zip(limits_m).all(|(m, [min, max])| (min..=max).contains(&m)) {
-                *position_m = [0.0; 3];
-            }
-        }
+    /// Returns whether all points are inside.
+    pub fn is_none(&self) -> bool {
+        self.0 == [[f64::NEG_INFINITY, f64::INFINITY]; 3]
+    }
+
+    /// Returns whether a position in the map frame is inside.
+    pub fn contain(&self, in_map_m: [f64; 3]) -> bool {
+        in_map_m.iter().zip(&self.0).all(|(m, [min, max])| (min..=max).contains(&m))
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use voxtile_formats::RigidPose;
 
     #[test]
     fn limits_are_in_the_map_frame_and_inclusive() {
@@ -31,11 +26,11 @@ mod tests {
         let pose = RigidPose { position_m: [1.0, 0.0, 2.0], quaternion: [1.0, 0.0, 0.0, 0.0] };
         let mut limits = PointLimits([[f64::NEG_INFINITY, f64::INFINITY]; 3]);
         let points = [[1.0, 1.0, 2.0], [1.0, 1.0, 1.5], [1.0, 1.0, 2.5], [7.0, 1.0, 1.0]];
-        let mut kept = points;
-        limits.apply(&mut kept, &pose);
-        assert_eq!(kept, points);
+        let inside = |limits: &PointLimits| points.map(|point| limits.contain(pose.apply(point)));
+        assert!(limits.is_none());
+        assert_eq!(inside(&limits), [true; 4]);
         limits.0[2] = [0.0, 0.75];
-        limits.apply(&mut kept, &pose);
-        assert_eq!(kept, [points[0], points[1], [0.0; 3], [0.0; 3]]);
+        assert!(!limits.is_none());
+        assert_eq!(inside(&limits), [true, true, false, false]);
     }
 }

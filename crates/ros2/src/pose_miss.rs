@@ -93,6 +93,7 @@ mod tests {
             cdr: Vec::new(),
             points_bytes: 0,
             arrived: Instant::now(),
+            periods: None,
             poses: None,
         };
         let (sources, max_wait) = ("/tf and /tf_static", Duration::from_millis(500));

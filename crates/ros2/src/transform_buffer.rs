@@ -1,6 +1,6 @@
 use crate::args::Args;
 use crate::cloud::Cloud;
-use crate::cloud_poses::CloudPoses;
+use crate::cloud_poses::{CloudPoses, Motion};
 use crate::cloud_queue::{CloudQueue, Verdict};
 use crate::counters::Counters;
 use crate::frame_owners::FrameOwners;
@@ -10,10 +10,12 @@ use crate::pose_watch::{Missed, PoseWatch};
 use crate::stamp_check::{StampCheck, StampVerdict};
 use crate::transport::Gid;
 use std::collections::{HashMap, HashSet};
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 use voxtile_formats::poses::most_gap_ns;
 use voxtile_formats::ros::messages::StampedPose;
 use voxtile_formats::ros::{BadTransform, Transforms, WhyNot};
+use voxtile_formats::{RigidPose, SweepPeriods};
 
 /// Buffer of recent transforms. Also decides how long clouds wait for their poses.
 #[derive(Debug)]
@@ -112,7 +114,7 @@ impl TransformBuffer {
 
     /// Removes old samples. If too many are left, also removes samples of the frames with most samples.
     fn remove_old(&mut self, queue: &mut CloudQueue, counters: &mut Counters) {
-        queue.settle(|cloud| self.find(cloud).ok());
+        queue.settle(|cloud| self.find(cloud, false).ok());
         let mut left = self.transforms.forget_older_than(SPAN_NS);
         while left > MAX_SAMPLES - FORGET_EVERY {
             let lost = self.transforms.shrink_largest();
@@ -153,7 +155,9 @@ impl TransformBuffer {
                 log::warn!(
                     "the clock of {child}{of} has jumped: dropped the earlier transforms of {count} frames"
                 );
-                queue.settle(|cloud| if cloud.arrived < since { self.look_up(cloud).ok() } else { None });
+                queue.settle(
+                    |cloud| if cloud.arrived < since { self.look_up(cloud, true).ok() } else { None },
+                );
                 for child in children {
                     self.transforms.forget_samples(&child);
                 }
@@ -167,7 +171,8 @@ impl TransformBuffer {
         if !self.sensors.contains_key(bare(&cloud.frame)) && self.sensors.len() < MAX_SENSORS {
             self.sensors.insert(bare(&cloud.frame).to_owned(), None);
         }
-        let why = match cloud.poses.map_or_else(|| self.find(cloud), Ok) {
+        let is_late = now.saturating_duration_since(cloud.arrived) >= self.max_wait;
+        let why = match cloud.poses.clone().map_or_else(|| self.find(cloud, is_late), Ok) {
             Ok(poses) => {
                 if let Some(stamp_ns) = self.sensors.get_mut(bare(&cloud.frame)) {
                     *stamp_ns = Some(cloud.stamp_ns);
@@ -179,7 +184,7 @@ impl TransformBuffer {
         };
         let may_pass = !matches!(why, WhyNot::AlreadyFixed(_));
         // Transforms may arrive late and out of order.
-        let is_dropped = !may_pass || now.saturating_duration_since(cloud.arrived) >= self.max_wait;
+        let is_dropped = !may_pass || is_late;
         let missed = Missed { topic: cloud.topic, may_pass, is_dropped };
         let miss = PoseMiss {
             why: &why,
@@ -223,8 +228,8 @@ impl TransformBuffer {
     }
 
     /// Returns the poses of a cloud, unless the clock of one of its frames may have jumped.
-    fn find(&self, cloud: &Cloud) -> Result<CloudPoses, WhyNot> {
-        let poses = self.look_up(cloud)?;
+    fn find(&self, cloud: &Cloud, is_late: bool) -> Result<CloudPoses, WhyNot> {
+        let poses = self.look_up(cloud, is_late)?;
         // Transforms since then may be of a new clock that repeats the same stamps.
         let mut off = self.stamps.off().filter(|(_, since)| *since <= cloud.arrived).peekable();
         if off.peek().is_some() {
@@ -237,7 +242,8 @@ impl TransformBuffer {
         Ok(poses)
     }
 
-    fn look_up(&self, cloud: &Cloud) -> Result<CloudPoses, WhyNot> {
+    /// Returns the poses of a cloud. Unless it is late, those at the times of all its points must be known or lost.
+    fn look_up(&self, cloud: &Cloud, is_late: bool) -> Result<CloudPoses, WhyNot> {
         // Without a sensor position, the rays of a cloud in the map frame would begin at the origin.
         if bare(&cloud.frame) == self.fixed_frame {
             return Err(WhyNot::AlreadyFixed(self.fixed_frame.clone()));
@@ -245,7 +251,33 @@ impl TransformBuffer {
         let pose_in = |frame: &str| self.transforms.lookup(frame, &cloud.frame, cloud.stamp_ns);
         let map_from_sensor = pose_in(&self.fixed_frame)?;
         let base_from_sensor = self.base_frame.as_deref().map(pose_in).transpose()?;
-        Ok(CloudPoses { map_from_sensor, base_from_sensor })
+        let motion = match &cloud.periods {
+            Some(periods) => self.motion(cloud, periods, &map_from_sensor, is_late)?,
+            None => None,
+        };
+        Ok(CloudPoses { map_from_sensor, base_from_sensor, motion })
+    }
+
+    fn motion(
+        &self,
+        cloud: &Cloud,
+        periods: &SweepPeriods,
+        map_from_sensor: &RigidPose,
+        is_late: bool,
+    ) -> Result<Option<Motion>, WhyNot> {
+        let pose_at = |at_ns: i64| self.transforms.lookup(&self.fixed_frame, &cloud.frame, at_ns);
+        let mut is_partial = false;
+        if let Some(end_ns) = periods.end_ns()
+            && let Err(why @ WhyNot::After(_)) = pose_at(cloud.stamp_ns.saturating_add(end_ns))
+        {
+            if !is_late {
+                return Err(why);
+            }
+            is_partial = true;
+        }
+        // A pose that is not finite in single precision: the points stay as measured.
+        let sweep = periods.sweep(cloud.stamp_ns, map_from_sensor, |at_ns| pose_at(at_ns).ok()).ok();
+        Ok(sweep.map(|sweep| Motion { sweep: Arc::new(sweep), is_partial }))
     }
 }
 
@@ -264,7 +296,6 @@ mod tests {
     use super::*;
     use crate::when_behind::WhenBehind;
     use clap::Parser;
-    use voxtile_formats::RigidPose;
     use voxtile_formats::ros::messages::Header;
 
     fn buffer() -> TransformBuffer {
@@ -285,7 +316,16 @@ mod tests {
 
     fn cloud(stamp_ns: i64) -> Cloud {
         let (frame, cdr) = ("lidar".to_owned(), Vec::new());
-        Cloud { topic: 0, stamp_ns, frame, cdr, points_bytes: 0, arrived: Instant::now(), poses: None }
+        Cloud {
+            topic: 0,
+            stamp_ns,
+            frame,
+            cdr,
+            points_bytes: 0,
+            arrived: Instant::now(),
+            periods: None,
+            poses: None,
+        }
     }
 
     #[test]
@@ -354,6 +394,33 @@ mod tests {
     }
 
     #[test]
+    fn a_deskewed_cloud_waits_for_the_transforms_of_its_last_points() {
+        const MS: i64 = 1_000_000;
+        let (mut buffer, mut counters, start) = (buffer(), Counters::default(), Instant::now());
+        let mut insert = |buffer: &mut TransformBuffer, stamp_ns: i64| {
+            let pose = pose("map", "lidar", stamp_ns, stamp_ns as f64 * 1e-9);
+            buffer.insert(&pose, false, None, start, &mut queue(), &mut counters);
+        };
+        let mut periods = SweepPeriods::default();
+        (0..=100).for_each(|ms| periods.add(ms * MS));
+        let cloud = Cloud { periods: Some(periods), arrived: start, ..cloud(50 * MS) };
+        (0..=140).step_by(20).for_each(|ms| insert(&mut buffer, ms * MS));
+        assert!(matches!(buffer.verdict(&cloud, start), Verdict::Waits));
+        let late = buffer.verdict(&cloud, start + Duration::from_secs(2));
+        let Verdict::Ready(CloudPoses { motion: Some(motion), .. }) = late else { panic!("{late:?}") };
+        // The poses up to the last transform are known.
+        assert!(motion.is_partial && motion.sweep.covers(89 * MS) && !motion.sweep.covers(91 * MS));
+        insert(&mut buffer, 160 * MS);
+        let Verdict::Ready(CloudPoses { motion: Some(motion), .. }) = buffer.verdict(&cloud, start) else {
+            panic!("all transforms are there");
+        };
+        assert!(!motion.is_partial && motion.sweep.covers(100 * MS));
+        let mut to_stamp = motion.sweep.to_stamp();
+        let moved_m = to_stamp.apply([10.0, 0.0, 0.0], 100 * MS)[0];
+        assert!((moved_m - 10.1).abs() < 1e-6, "{moved_m}");
+    }
+
+    #[test]
     fn a_clock_that_jumps_back_keeps_the_history_of_other_frames() {
         const S: i64 = 1_000_000_000;
         let (mut buffer, mut counters, start) = (buffer(), Counters::default(), Instant::now());
@@ -366,7 +433,7 @@ mod tests {
             buffer.insert(&pose("map", "base", stamp_ns, 3.0), false, None, now, &mut queue(), &mut counters);
             let found = buffer.verdict(&cloud(stamp_ns), now);
             assert!(
-                matches!(found, Verdict::Ready(pose) if pose.map_from_sensor.position_m[0] == 4.0),
+                matches!(&found, Verdict::Ready(pose) if pose.map_from_sensor.position_m[0] == 4.0),
                 "{number}: {found:?}"
             );
         }
@@ -422,7 +489,7 @@ mod tests {
             put(&mut buffer, &pose("map", "base", S, 2.0), false, robot);
             let found = buffer.verdict(&cloud(S / 2), start);
             assert!(
-                matches!(found, Verdict::Ready(pose) if pose.map_from_sensor.position_m[0] == 3.0),
+                matches!(&found, Verdict::Ready(pose) if pose.map_from_sensor.position_m[0] == 3.0),
                 "{found:?}"
             );
             assert!(buffer.transforms.frames() <= MAX_FRAMES);
@@ -451,7 +518,7 @@ mod tests {
         }
         let found = buffer.verdict(&cloud(S / 2), start);
         assert!(
-            matches!(found, Verdict::Ready(pose) if pose.map_from_sensor.position_m[0] == 3.0),
+            matches!(&found, Verdict::Ready(pose) if pose.map_from_sensor.position_m[0] == 3.0),
             "{found:?}"
         );
     }
@@ -494,7 +561,7 @@ mod tests {
         for stamp_ns in [S / 100, 2 * S - S / 100, 3 * S + S / 100] {
             let found = buffer.verdict(&cloud(stamp_ns), now);
             assert!(
-                matches!(found, Verdict::Ready(pose) if pose.map_from_sensor.position_m[0] == 3.0),
+                matches!(&found, Verdict::Ready(pose) if pose.map_from_sensor.position_m[0] == 3.0),
                 "{stamp_ns}: {found:?}"
             );
         }
@@ -537,7 +604,7 @@ mod tests {
                 let now = start + Duration::from_nanos(stamp_ns as u64);
                 let found = buffer.verdict(&Cloud { arrived: now, ..cloud(stamp_ns) }, now);
                 assert!(
-                    matches!(found, Verdict::Ready(pose) if pose.map_from_sensor.position_m[0] == 3.0),
+                    matches!(&found, Verdict::Ready(pose) if pose.map_from_sensor.position_m[0] == 3.0),
                     "{tick}: {found:?}"
                 );
             }
@@ -621,7 +688,7 @@ mod tests {
         (301..400).for_each(|number| tick(&mut buffer, &mut queue, number, (number - 250) * S / 50, 9.0));
         let found = buffer.verdict(&again, at(301));
         assert!(
-            matches!(found, Verdict::Ready(pose) if pose.map_from_sensor.position_m[0] == 9.0),
+            matches!(&found, Verdict::Ready(pose) if pose.map_from_sensor.position_m[0] == 9.0),
             "{found:?}"
         );
         let taken = queue.take_ready(&mut Counters::default(), |cloud| buffer.verdict(cloud, at(400)));

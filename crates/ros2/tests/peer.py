@@ -1,11 +1,12 @@
 """An independent ROS 2 peer (Cyclone DDS): writes a bag of clouds and tf, and publishes the same messages.
 
-peer.py DOMAIN BAG CLOUDS [hostile | types | variants | odometry | sensors | path | real FOLDER]
+peer.py DOMAIN BAG CLOUDS [hostile | types | variants | odometry | sensors | deskew | path | real FOLDER]
 
 variants: the same points in organised clouds, big-endian, or in double precision with another order of fields.
 hostile: sends a malformed cloud and transforms that form loops before each cloud.
 types: other participants publish and subscribe to the same topics with other types.
 odometry: sends poses as nav_msgs/Odometry, and only the sensor mount on tf.
+deskew: points have times; the last ones are after the last transform.
 sensors: two sensors whose clouds do not overlap, with their mounts.
 rclpy: clouds in the child frame of the odometry, without tf; used by rclpy_peer.py.
 path: sends a corrected path after the first CLOUDS, also written to BAG.tum; more clouds follow at once.
@@ -108,6 +109,17 @@ def attributed(plain):
     return PointCloud2(plain.header, 1, len(rows), fields, False, 24, len(data), data, False)
 
 
+def timed(plain):
+    """Returns the same points with the times of a sweep of 120 ms, in nanoseconds after the stamp."""
+    points = np.frombuffer(plain.data, "<f4").reshape(-1, 4)
+    rows = np.zeros(len(points), {"names": ["point", "t"], "formats": ["4<f4", "<u4"], "itemsize": 20})
+    rows["point"] = points
+    rows["t"] = np.arange(len(points)) * 60_000
+    data = rows.tobytes()
+    fields = [*plain.fields, PointField("t", 16, 6, 1)]
+    return PointCloud2(plain.header, 1, len(rows), fields, False, 20, len(data), data, False)
+
+
 def real_messages(clouds, folder):
     """Yields the messages of a recording: each cloud with the pose at its stamp."""
     poses = [line.split() for line in open(folder / "poses_tum.txt") if not line.startswith("#")]
@@ -152,7 +164,11 @@ def messages(clouds, kind, folder):
         if tick % 5 == 0 and tick // 5 < clouds:
             plain = cloud(stamp_ns + 7_000_000, tick)
             plain.header.frame_id = "base" if kind == "rclpy" else "lidar"
-            changed = {"variants": lambda: variant(plain, tick // 5), "layers": lambda: attributed(plain)}
+            changed = {
+                "variants": lambda: variant(plain, tick // 5),
+                "layers": lambda: attributed(plain),
+                "deskew": lambda: timed(plain),
+            }
             yield "/cloud_in", changed.get(kind, lambda: plain)()
 
 

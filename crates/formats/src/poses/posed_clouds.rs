@@ -3,7 +3,7 @@ use super::{Found, SweepPeriods, Trajectory};
 use crate::scans::Fingerprint;
 use crate::scans::PointStore;
 use crate::scans::{ScanHead, ScanSource};
-use crate::{CloudHead, CloudPoint, CloudSource, PoseAt, RigidPose};
+use crate::{CloudHead, CloudSource, PoseAt, RigidPose};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use voxtile::scan::{AttributeSet, NO_TIME, Pose, Sweep, no_return};
@@ -255,7 +255,7 @@ impl PosedClouds {
             if attributes.is_none() {
                 return points.push(in_sensor, point.intensity);
             }
-            let time_ns = if attributes.times { time_after_stamp(&point) } else { NO_TIME };
+            let time_ns = if attributes.times { point.after_stamp_ns() } else { NO_TIME };
             periods.add(time_ns);
             points.push_with(in_sensor, point.intensity, point.colour, point.class, time_ns)
         })?;
@@ -288,16 +288,6 @@ impl PosedClouds {
         let body_from_sensor = &self.options.body_from_sensor;
         let ([x, y, z], [qx, qy, qz, qw]) = (body_from_sensor.position_m, body_from_sensor.quaternion);
         (*body_from_sensor != RigidPose::IDENTITY).then_some([x, y, z, qx, qy, qz, qw])
-    }
-}
-
-/// Returns the time of a point after the stamp, in nanoseconds. Rays without a return stay as measured.
-fn time_after_stamp(point: &CloudPoint) -> i64 {
-    match point.is_return {
-        // The cast saturates; such times are outside all poses.
-        true if point.time_s.is_finite() => ((point.time_s * 1e9).round() as i64).max(NO_TIME + 1),
-        true => i64::MAX,
-        false => NO_TIME,
     }
 }
 

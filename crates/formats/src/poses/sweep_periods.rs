@@ -32,6 +32,21 @@ impl SweepPeriods {
         Self { periods: begins.map(|begin| begin / Sweep::PERIOD_NS).collect(), last: None }
     }
 
+    /// Number of periods.
+    pub fn len(&self) -> usize {
+        self.periods.len()
+    }
+
+    /// Returns whether there are no periods.
+    pub fn is_empty(&self) -> bool {
+        self.periods.is_empty()
+    }
+
+    /// Returns the last time at which a pose is needed, in nanoseconds after the stamp.
+    pub fn end_ns(&self) -> Option<i64> {
+        self.periods.last().map(|last| last.saturating_add(1).saturating_mul(Sweep::PERIOD_NS))
+    }
+
     /// Adds the time of a point, in nanoseconds after the stamp.
     #[inline]
     pub fn add(&mut self, after_ns: i64) {

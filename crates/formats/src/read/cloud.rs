@@ -1,6 +1,6 @@
 use crate::poses::RigidPose;
 use voxtile::Result;
-use voxtile::scan::AttributeSet;
+use voxtile::scan::{AttributeSet, NO_TIME};
 
 /// Properties of a cloud that are known before its points are read.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -48,6 +48,17 @@ impl CloudPoint {
     /// Creates a return without intensity, time and attributes.
     pub fn hit(position_m: [f64; 3]) -> Self {
         Self { position_m, intensity: 0.0, time_s: 0.0, colour: None, class: None, is_return: true }
+    }
+
+    /// Returns the time of the measurement in nanoseconds after the stamp, [`NO_TIME`] for a ray without a return: it
+    /// stays as measured. A time that is not finite is outside all trajectories.
+    pub fn after_stamp_ns(&self) -> i64 {
+        match self.is_return {
+            // The cast saturates.
+            true if self.time_s.is_finite() => ((self.time_s * 1e9).round() as i64).max(NO_TIME + 1),
+            true => i64::MAX,
+            false => NO_TIME,
+        }
     }
 }
 

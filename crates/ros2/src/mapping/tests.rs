@@ -32,12 +32,21 @@ fn cloud(points_m: Vec<[f64; 3]>) -> Cloud {
     let frame = "lidar".to_owned();
     let header = messages::Header { frame_id: frame.clone(), ..messages::Header::default() };
     let cdr = messages::PointCloud2::of_points(header, points_m).cdr();
-    Cloud { topic: 0, stamp_ns: 0, frame, cdr, points_bytes: 0, arrived: Instant::now(), poses: None }
+    Cloud {
+        topic: 0,
+        stamp_ns: 0,
+        frame,
+        cdr,
+        points_bytes: 0,
+        arrived: Instant::now(),
+        periods: None,
+        poses: None,
+    }
 }
 
 fn at(sensor_m: Point) -> CloudPoses {
     let map_from_sensor = RigidPose { position_m: sensor_m, ..RigidPose::IDENTITY };
-    CloudPoses { map_from_sensor, base_from_sensor: None }
+    CloudPoses { map_from_sensor, base_from_sensor: None, motion: None }
 }
 
 impl Mapping {
@@ -305,7 +314,7 @@ fn the_ground_is_free_up_to_its_points_and_obstacles_on_it_are_occupied() {
     }
     // A box on the ground, and a point above the limit, which is in the base frame.
     points.extend([[2.0, 0.0, -0.7], [2.0, 0.0, 0.9]]);
-    mapping.insert(&cloud(points), &CloudPoses { map_from_sensor, base_from_sensor }).unwrap();
+    mapping.insert(&cloud(points), &CloudPoses { map_from_sensor, base_from_sensor, motion: None }).unwrap();
     assert_eq!(mapping.inbox.counters().0.points, 401);
     let state = |point_m| mapping.mapper.occupancy_at(point_m).unwrap();
     assert!(state([2.05, 0.05, 3.35]).is_occupied());
