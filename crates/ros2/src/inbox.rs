@@ -240,7 +240,7 @@ impl Inbox {
     }
 }
 
-/// What is known of a cloud before it is mapped.
+/// Properties of a cloud that are needed before it is mapped.
 struct CloudFacts {
     header: Header,
     /// Memory of its decoded points and periods.
