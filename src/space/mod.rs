@@ -39,8 +39,8 @@ pub use tile_index::TileIndex;
 pub use tile_selection::TileSelection;
 #[doc(hidden)]
 pub use tile_space::TileSpace;
-pub(crate) use tile_table::take_u32;
 pub use tile_table::{TileTable, TileValue, put_number, take_number};
+pub(crate) use tile_table::{skip_numbers, take_u32};
 pub use torus::Torus;
 
 /// Index of a voxel along x, y and z: `floor(coordinate / resolution)`.

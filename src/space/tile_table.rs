@@ -14,7 +14,8 @@ use std::iter::Peekable;
 /// ```
 ///
 /// Once a sixteenth of the tiles is recent, these are merged into their blocks. A change therefore costs the packing of
-/// about sixteen tiles, and a look-up the unpacking of at most 64.
+/// about sixteen tiles, and a look-up the unpacking of at most 64. Many changes at once are sorted and merged into their
+/// blocks without a look-up.
 #[derive(Clone)]
 pub struct TileTable<V> {
     recent: FxHashMap<TileIndex, Option<V>>,
@@ -29,11 +30,16 @@ pub trait TileValue: Copy + Default {
     fn pack(self, before: Self, out: &mut Vec<u8>);
     /// Reads the value from the front; `before` is the previous one.
     fn unpack(before: Self, input: &mut &[u8]) -> Self;
+    /// Passes over the value at the front.
+    fn skip(input: &mut &[u8]) {
+        Self::unpack(Self::default(), input);
+    }
 }
 
 #[derive(Clone)]
 struct Block {
     first: TileIndex,
+    tiles: u32,
     bytes: Box<[u8]>,
 }
 
@@ -43,6 +49,9 @@ const BLOCK_TILES: usize = 64;
 const MIN_RECENT: usize = 1024;
 /// Divisor for the maximum share of recent tiles.
 const RECENT_PART: usize = 16;
+/// Number of changes that are merged at once. Fewer than the minimum are inserted one by one.
+const MIN_MERGED: usize = 64;
+const MAX_MERGED: usize = 1 << 12;
 /// Overhead of the allocator per block.
 const ALLOCATION_BYTES: usize = 16;
 
@@ -104,15 +113,22 @@ impl<V: TileValue> TileTable<V> {
 
     /// All tiles and values, in order.
     pub fn iter(&self) -> impl Iterator<Item = (TileIndex, V)> {
-        let mut recent: Vec<_> = self.recent.iter().map(|(&tile, &value)| (tile, value)).collect();
-        recent.sort_unstable_by_key(|&(tile, _)| tile);
         let packed = self.blocks.iter().flat_map(Block::iter);
-        Merged { packed: packed.peekable(), recent: recent.into_iter().peekable() }
+        Merged { packed: packed.peekable(), recent: self.sorted_recent(|value| value).into_iter().peekable() }
+    }
+
+    fn sorted_recent<T>(&self, of_value: impl Fn(V) -> T) -> Vec<(TileIndex, Option<T>)> {
+        let recent = self.recent.iter().map(|(&tile, &value)| (tile, value.map(&of_value)));
+        let mut recent: Vec<_> = recent.collect();
+        recent.sort_unstable_by_key(|&(tile, _)| tile);
+        recent
     }
 
     /// All tiles, in order.
     pub fn tiles(&self) -> impl Iterator<Item = TileIndex> {
-        self.iter().map(|(tile, _)| tile)
+        let packed = self.blocks.iter().flat_map(Block::tiles::<V>).map(|tile| (tile, ()));
+        let recent = self.sorted_recent(|_| ()).into_iter();
+        Merged { packed: packed.peekable(), recent: recent.peekable() }.map(|(tile, ())| tile)
     }
 
     /// All values, in the order of the tiles.
@@ -133,11 +149,15 @@ impl<V: TileValue> TileTable<V> {
         }
     }
 
-    /// Merges recent tiles into their blocks; other blocks are unchanged.
+    /// Merges recent tiles into their blocks.
     fn pack(&mut self) {
         let mut recent: Vec<_> = std::mem::take(&mut self.recent).into_iter().collect();
         recent.sort_unstable_by_key(|&(tile, _)| tile);
-        let mut recent = &recent[..];
+        self.merge(&recent);
+    }
+
+    /// Merges changes, sorted by tile, into their blocks; other blocks are unchanged. No tile may be recent.
+    fn merge(&mut self, mut recent: &[(TileIndex, Option<V>)]) {
         let before = std::mem::take(&mut self.blocks);
         let ends: Vec<_> = before.iter().skip(1).map(|block| block.first).collect();
         let mut blocks = Vec::with_capacity(before.len());
@@ -161,7 +181,26 @@ impl<V: TileValue> TileTable<V> {
             }
         }
         self.block_bytes = blocks.iter().map(|block| block.bytes.len() + ALLOCATION_BYTES).sum();
+        self.tiles = blocks.iter().map(|block| block.tiles as usize).sum();
         self.blocks = blocks;
+    }
+
+    /// Inserts many tiles. The last of equal tiles counts.
+    fn insert_all(&mut self, tiles: &mut Vec<(TileIndex, Option<V>)>) {
+        if tiles.len() < MIN_MERGED {
+            let tiles = tiles.iter().filter_map(|&(tile, value)| Some((tile, value?)));
+            return tiles.for_each(|(tile, value)| self.insert(tile, value));
+        }
+        self.pack();
+        tiles.sort_by_key(|&(tile, _)| tile);
+        tiles.dedup_by(|next, kept| {
+            let is_same = next.0 == kept.0;
+            if is_same {
+                *kept = *next;
+            }
+            is_same
+        });
+        self.merge(tiles);
     }
 }
 
@@ -177,7 +216,7 @@ impl Block {
             value.pack(before.1, &mut bytes);
             before = (tile, value);
         }
-        Self { first, bytes: bytes.into() }
+        Self { first, tiles: tiles.len() as u32, bytes: bytes.into() }
     }
 
     fn iter<V: TileValue>(&self) -> impl Iterator<Item = (TileIndex, V)> {
@@ -186,10 +225,20 @@ impl Block {
             if input.is_empty() {
                 return None;
             }
-            let index = before.0.to_array().map(|index| i64::from(index) + take_number::<i64>(&mut input));
-            let tile = TileIndex::from(index.map(|index| index as i32));
-            before = (tile, V::unpack(before.1, &mut input));
+            before = (take_index(before.0, &mut input), V::unpack(before.1, &mut input));
             Some(before)
+        })
+    }
+
+    fn tiles<V: TileValue>(&self) -> impl Iterator<Item = TileIndex> {
+        let (mut input, mut tile) = (&*self.bytes, self.first);
+        std::iter::from_fn(move || {
+            if input.is_empty() {
+                return None;
+            }
+            tile = take_index(tile, &mut input);
+            V::skip(&mut input);
+            Some(tile)
         })
     }
 }
@@ -206,6 +255,28 @@ pub fn take_number<N: VarInt + Default>(input: &mut &[u8]) -> N {
     let (number, length) = N::decode_var(input).unwrap_or_default();
     *input = input.get(length..).unwrap_or_default();
     number
+}
+
+/// Reads the index of a tile: its difference from that of the tile before.
+#[inline]
+fn take_index(before: TileIndex, input: &mut &[u8]) -> TileIndex {
+    let mut step = || match **input {
+        // Most tiles are neighbours of the one before: their steps are single bytes.
+        [byte @ 0..0x80, ref rest @ ..] => {
+            *input = rest;
+            i64::from(byte >> 1) ^ -i64::from(byte & 1)
+        }
+        _ => take_number::<i64>(input),
+    };
+    before.to_array().map(|index| (i64::from(index) + step()) as i32).into()
+}
+
+/// Passes over numbers at the front.
+pub fn skip_numbers(numbers: usize, input: &mut &[u8]) {
+    for _ in 0..numbers {
+        let length = input.iter().position(|byte| byte & 0x80 == 0).map_or(input.len(), |last| last + 1);
+        *input = input.get(length..).unwrap_or_default();
+    }
 }
 
 /// Reads four bytes from the front, for numbers that a varint would not shorten.
@@ -256,7 +327,15 @@ impl<V> Default for TileTable<V> {
 
 impl<V: TileValue> Extend<(TileIndex, V)> for TileTable<V> {
     fn extend<I: IntoIterator<Item = (TileIndex, V)>>(&mut self, tiles: I) {
-        tiles.into_iter().for_each(|(tile, value)| self.insert(tile, value));
+        let (mut tiles, mut some) = (tiles.into_iter(), Vec::new());
+        loop {
+            some.clear();
+            some.extend(tiles.by_ref().take(MAX_MERGED).map(|(tile, value)| (tile, Some(value))));
+            if some.is_empty() {
+                break;
+            }
+            self.insert_all(&mut some);
+        }
     }
 }
 
@@ -321,14 +400,24 @@ mod tests {
                     }
                     None => prop_assert_eq!(table.remove(tile), naive.remove(&tile).is_some()),
                 }
-                if number % 997 == 0 {
-                    table.pack();
+                match number % 997 {
+                    0 => table.pack(),
+                    7 | 500 => {
+                        let many: Vec<_> = changes.iter().rev().step_by(1 + number % 50).collect();
+                        let many = many.iter().filter_map(|(tile, seed)| Some((*tile, version((*seed)?))));
+                        naive.extend(many.clone());
+                        table.extend(many);
+                    }
+                    _ => {}
                 }
                 prop_assert_eq!(table.len(), naive.len());
             }
             for (tile, _) in changes {
                 prop_assert_eq!(table.get(tile), naive.get(&tile).copied());
             }
+            let collected: TileTable<TileVersion> = naive.iter().map(|(tile, value)| (*tile, *value)).collect();
+            prop_assert!(collected == table && collected.len() == naive.len());
+            prop_assert!(table.tiles().eq(naive.keys().copied()));
             prop_assert!(table.iter().eq(naive));
         }
     }

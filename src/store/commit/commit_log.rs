@@ -1,7 +1,9 @@
 use super::commit_record::{Flush, Next, Record};
 use super::commits::Commits;
 use crate::error::{DecodeError, FormatError};
+use crate::space::TileTable;
 use crate::store::disk::Disk;
+use crate::store::tiles::tile_version::TileVersion;
 use std::io::{self, Read};
 use std::path::Path;
 
@@ -106,24 +108,42 @@ impl Commits {
     /// As for [`CommitLog::read`].
     pub fn read_from(&mut self, input: &mut impl Read, file_bytes: u64) -> Result<CommitLog, DecodeError> {
         let map_id = read_header(input, file_bytes)?;
+        let mut last = LastChanged::None;
+        let bytes = self.read_records(input, file_bytes, &mut last);
+        match last {
+            LastChanged::None => {}
+            LastChanged::All => self.last_changed = self.tiles.tiles().map(|tile| (tile, ())).collect(),
+            LastChanged::Some(changed) => {
+                self.last_changed = changed.tiles().map(|tile| (tile, ())).collect();
+            }
+        }
+        Ok(CommitLog { map_id, bytes: bytes? })
+    }
+
+    /// Reads the records after the header; returns the length of the valid part.
+    fn read_records(
+        &mut self,
+        input: &mut impl Read,
+        file_bytes: u64,
+        last: &mut LastChanged,
+    ) -> Result<u64, DecodeError> {
         let mut bytes = HEADER_BYTES as u64;
         loop {
             match Next::read(input, bytes, file_bytes)? {
                 Next::Record(record, record_bytes) => {
-                    self.take(*record, bytes)?;
+                    *last = self.take(*record, bytes)?;
                     bytes += record_bytes;
                 }
                 Next::Torn(error) => {
                     self.torn = Some(error);
-                    break;
+                    return Ok(bytes);
                 }
-                Next::End => break,
+                Next::End => return Ok(bytes),
             }
         }
-        Ok(CommitLog { map_id, bytes })
     }
 
-    fn take(&mut self, record: Record, offset: u64) -> Result<(), FormatError> {
+    fn take(&mut self, record: Record, offset: u64) -> Result<LastChanged, FormatError> {
         if record.flush_number < self.flush_number {
             let reason = "the flush number is lower than in the previous record";
             return Err(FormatError::at_offset(offset, reason));
@@ -131,18 +151,30 @@ impl Commits {
         self.flush_number = record.flush_number;
         self.scan_number = record.scan_number;
         self.metadata = record.metadata.or(self.metadata.take());
-        self.last_changed = record.changed.tiles().map(|tile| (tile, ())).collect();
-        match record.is_whole_map {
-            true => self.tiles = record.changed,
-            false => self.tiles.extend(record.changed.iter()),
-        }
+        let last = match record.is_whole_map {
+            true => {
+                self.tiles = record.changed;
+                LastChanged::All
+            }
+            false => {
+                self.tiles.extend(record.changed.iter());
+                LastChanged::Some(record.changed)
+            }
+        };
         for &tile in &record.removed {
             self.tiles.remove(tile);
         }
         self.last_removed = record.removed;
         self.catalog = record.catalog;
-        Ok(())
+        Ok(last)
     }
+}
+
+/// Tiles that the last record of a log changes.
+enum LastChanged {
+    None,
+    All,
+    Some(TileTable<TileVersion>),
 }
 
 fn header(map_id: [u8; 16]) -> [u8; HEADER_BYTES] {

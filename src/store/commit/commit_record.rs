@@ -205,14 +205,13 @@ impl Record {
         if tiles * TILE_BYTES as u64 > payload.left {
             return Err(payload.wrong(20, "the number of tiles does not fit the record"));
         }
-        let mut changed = TileTable::default();
-        for _ in 0..tiles {
+        let changed = (0..tiles).map(|_| {
             let tile = index_from(payload.take()?);
-            let Some(version) = TileVersion::from_bytes(&payload.take()?) else {
-                return Err(payload.wrong(TILE_BYTES as u64, "tile sizes or counts out of range"));
-            };
-            changed.insert(tile, version);
-        }
+            let version = TileVersion::from_bytes(&payload.take()?);
+            let out_of_range = || payload.wrong(TILE_BYTES as u64, "tile sizes or counts out of range");
+            Ok((tile, version.ok_or_else(out_of_range)?))
+        });
+        let changed = changed.collect::<Result<_, DecodeError>>()?;
         let mut removed = Vec::new();
         if kind & NAMES_REMOVED != 0 {
             let does_not_fit = "the number of removed tiles does not fit the record";

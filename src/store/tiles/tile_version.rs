@@ -1,5 +1,5 @@
 use super::file_checksum::FileChecksum;
-use crate::space::{TileValue, put_number, take_number, take_u32};
+use crate::space::{TileValue, put_number, skip_numbers, take_number, take_u32};
 use crate::store::layout::TileFile;
 
 /// Version of a tile in the log: identifies its files, and has its voxel counts.
@@ -88,5 +88,13 @@ impl TileValue for TileVersion {
         };
         let (table, octree) = (file(input), file(input));
         Self { scan_number, table, octree, voxels: take_number(input), occupied: take_number(input) }
+    }
+
+    fn skip(input: &mut &[u8]) {
+        skip_numbers(2, input);
+        take_u32(input);
+        skip_numbers(1, input);
+        take_u32(input);
+        skip_numbers(2, input);
     }
 }
