@@ -9,22 +9,28 @@ use crate::space::{
 };
 use crate::tile::{BrickView, Tile, Voxel};
 
+/// A question about a box in at most this many tiles keeps them in memory, because the next box is probably near. Larger
+/// boxes are for exports.
+const MAX_KEPT_TILES: usize = 8;
+
+/// Returns a tile of a box that has so many tiles.
+fn tile_of_box<V: MapView + ?Sized>(view: &V, index: TileIndex, tiles: usize) -> Result<Option<TileRef<'_>>> {
+    if tiles <= MAX_KEPT_TILES { view.tile(index) } else { view.tile_uncached(index) }
+}
+
 pub(super) fn evidence_in<'a, V: MapView + ?Sized>(
     view: &'a V,
     region: &Aabb,
 ) -> impl Iterator<Item = Result<Voxel>> + use<'a, V> {
-    let (grid, region) = (view.config().grid, *region);
-    let voxels = voxels_around(&grid, &region);
-    tiles_in(view, &voxels).into_iter().flat_map(move |index| {
-        let tile = match view.tile_uncached(index) {
+    let voxels = view.config().grid.voxels_in(region);
+    let tiles = tiles_in(view, &voxels);
+    let count = tiles.len();
+    tiles.into_iter().flat_map(move |index| {
+        let tile = match tile_of_box(view, index, count) {
             Ok(tile) => tile,
             Err(error) => return vec![Err(error)],
         };
-        let inside = |tile: TileRef<'_>| {
-            let voxels = voxels_in(&tile, &voxels);
-            voxels.filter(|voxel| region.contains(grid.center_m(voxel.index))).map(Ok).collect()
-        };
-        tile.map_or(Vec::new(), inside)
+        tile.map_or(Vec::new(), |tile| voxels_in(&tile, &voxels).map(Ok).collect())
     })
 }
 
@@ -53,19 +59,23 @@ pub(super) fn for_each_occupied(
             Ok(())
         });
     };
-    let grid = view.config().grid;
-    let around = voxels_around(&grid, region);
-    let mut visit = |voxel: Voxel| {
-        if region.contains(grid.center_m(voxel.index)) {
+    let voxels = view.config().grid.voxels_in(region);
+    let tiles = tiles_in(view, &voxels);
+    let visit_tile = |index: TileIndex, visit: &mut dyn FnMut(Voxel)| {
+        let Some(tile) = tile_of_box(view, index, tiles.len())? else { return Ok(()) };
+        let bricks = bricks_in(&tile, &voxels).filter(|brick| brick.may_hold(&tile, threshold));
+        bricks.flat_map(|brick| brick.voxels_from(&tile, threshold)).for_each(visit);
+        Ok(())
+    };
+    if tiles.len() <= MAX_KEPT_TILES {
+        return tiles.iter().try_for_each(|&index| visit_tile(index, &mut visit));
+    }
+    let mut visit_inside = |voxel: Voxel| {
+        if voxels.contains(voxel.index) {
             visit(voxel);
         }
     };
-    for_each_from(view, &tiles_in(view, &around), threshold, &mut visit, |index, visit| {
-        let Some(tile) = view.tile_uncached(index)? else { return Ok(()) };
-        let bricks = bricks_in(&tile, &around).filter(|brick| brick.may_hold(&tile, threshold));
-        bricks.flat_map(|brick| brick.voxels_from(&tile, threshold)).for_each(&mut *visit);
-        Ok(())
-    })
+    for_each_from(view, &tiles, threshold, &mut visit_inside, |index, visit| visit_tile(index, visit))
 }
 
 pub(super) fn cached_occupied_voxels(

@@ -4,9 +4,11 @@ use std::path::{Path, PathBuf};
 use testkit::faulty_disk::{Fault, FaultyDisk};
 use testkit::random_scans::{Random, random_scan};
 use voxtile::sensor::{Evidence, Iwlo, SensorModel};
-use voxtile::space::VoxelIndex;
+use voxtile::space::{Aabb, TileIndex, VoxelIndex};
 use voxtile::store::SnapshotName;
-use voxtile::{Error, MapConfig, MapPath, MapReader, MapView, Mapper, OutOfCoreTileMapper, Storage};
+use voxtile::{
+    Error, MapConfig, MapPath, MapQueries, MapReader, MapView, Mapper, OutOfCoreTileMapper, Storage,
+};
 
 fn map() -> &'static Path {
     Path::new("/map")
@@ -204,4 +206,34 @@ fn only_a_part_of_a_long_file_is_read() {
             Err(error) => assert!(matches!(error, Error::Damaged { .. }), "{error}"),
         }
     }
+}
+
+#[test]
+fn a_small_box_keeps_its_tiles_and_reads_no_neighbour() {
+    let disk = small(Storage::Compact, 5);
+    let reader = MapReader::open(MapPath::on(disk.shared(), map()), 64 << 20).unwrap();
+    let tile = TileIndex::new(0, 0, 0);
+    assert!(reader.has_tile(tile) && reader.has_tile(TileIndex::new(-1, 0, 0)));
+    let region = Aabb { min: [0.0; 3], max: [3.2; 3] };
+    let mut found = Vec::new();
+    for _ in 0..3 {
+        found.clear();
+        reader.for_each_voxel_in(&region, |voxel| found.push(voxel.index)).unwrap();
+        assert_eq!((reader.statistics().io.loads, reader.cached_tile_indices()), (1, vec![tile]));
+    }
+    let whole = reader.tile_uncached(tile).unwrap().unwrap();
+    assert!(!found.is_empty() && found.iter().copied().eq(whole.voxels().map(|voxel| voxel.index)));
+    let occupied = |region: &Aabb| -> Vec<VoxelIndex> {
+        let mut voxels = Vec::new();
+        reader.for_each_occupied(None, Some(region), |voxel| voxels.push(voxel.index)).unwrap();
+        voxels
+    };
+    let wanted =
+        whole.voxels().filter(|voxel| voxel.evidence.log_odds >= reader.config().occupied_log_odds());
+    assert!(occupied(&region).into_iter().eq(wanted.map(|voxel| voxel.index)));
+    assert_eq!(reader.statistics().io.loads, 1);
+    // A box of many tiles leaves the memory as it is.
+    let everywhere = Aabb { min: [-50.0; 3], max: [50.0; 3] };
+    assert!(reader.tile_indices().len() > 8 && occupied(&everywhere).len() > occupied(&region).len());
+    assert_eq!((reader.statistics().io.loads, reader.cached_tile_indices()), (1, vec![tile]));
 }
