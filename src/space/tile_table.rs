@@ -170,10 +170,14 @@ impl<V: TileValue> TileTable<V> {
             match before.next() {
                 Some(block) if changes.is_empty() => blocks.push(block),
                 block => {
-                    let packed = block.iter().flat_map(Block::iter);
-                    let merged =
-                        Merged { packed: packed.peekable(), recent: changes.iter().copied().peekable() };
-                    let merged: Vec<(TileIndex, V)> = merged.collect();
+                    let merged: Vec<(TileIndex, V)> = match block {
+                        Some(block) => {
+                            let (packed, recent) =
+                                (block.iter().peekable(), changes.iter().copied().peekable());
+                            Merged { packed, recent }.collect()
+                        }
+                        None => changes.iter().filter_map(|&(tile, value)| Some((tile, value?))).collect(),
+                    };
                     // The blocks get equal sizes, so that the next few tiles do not split them again.
                     let parts = merged.len().div_ceil(BLOCK_TILES).max(1);
                     blocks.extend(merged.chunks(merged.len().div_ceil(parts).max(1)).map(Block::of));
