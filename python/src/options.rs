@@ -9,7 +9,7 @@ use voxtile::space::Aabb;
 use voxtile::{Clearing, InsertMode, MemoryLimit, Storage};
 use voxtile_formats::write::FileUnit;
 use voxtile_formats::{ReadOptions, Returns};
-use voxtile_pipeline::numbers::{Mount, point_of, region_of, set_mount, tolerance_ns};
+use voxtile_pipeline::numbers::{Mount, point_of, region_of, set_mount, step_of_points_m, tolerance_ns};
 use voxtile_pipeline::{BuildOptions, ExportOptions, SensorModelKind, WhenBehind, WhichVoxels};
 
 pub const STORAGES: [(&str, Storage); 2] = [("octomap", Storage::OctoMap), ("compact", Storage::Compact)];
@@ -53,6 +53,7 @@ pub fn read_options(py: Python<'_>, keywords: &mut Keywords<'_>) -> PyResult<Rea
     selection.count = keywords.count("count")?;
     selection.every = keywords.count("every")?.unwrap_or(selection.every);
     selection.ignored = region(py, keywords, "ignore_box")?;
+    selection.step_m = keywords.number("round_points")?.map(step_of_points_m).transpose().map_err(raised)?;
     options.classes.only_class = classes(py, keywords, "only_class")?;
     options.classes.skip_class = classes(py, keywords, "skip_class")?;
     options.returns = keywords.one_of("returns", &RETURNS)?.unwrap_or_default();

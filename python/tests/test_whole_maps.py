@@ -122,12 +122,13 @@ def test_a_build_reads_inputs_as_the_command_does(tmp_path: Path, scans: Path) -
             resolution=np.float64(0.25),
             max_range=1.5,
             ignore_box=box,
+            round_points=0.002,
             insert_mode="per-ray",
             flush_every=2,
         )
-    assert len(answer["remarks"]) == 1
+    assert len(answer["remarks"]) == 2
     corners = [str(number) for number in box.reshape(-1)]
-    how = ["--resolution=0.25", "--max-range=1.5", "--insert=per-ray", "--ignore-box", *corners]
+    how = ["--resolution=0.25", "--max-range=1.5", "--insert=per-ray", "--round-points=0.002", "--ignore-box", *corners]
     voxtile_command("build", scans, "-o", theirs, *how)
     assert voxtile.digest(ours) == voxtile.digest(theirs)
     with pytest.raises(errors.ArgumentError, match="unexpected argument 'resolutoin'"):

@@ -1,7 +1,7 @@
 use crate::args::{FrameName, ReadArgs, ReturnsName};
 use voxtile::Result;
 use voxtile_formats::{ReadOptions, Returns};
-use voxtile_pipeline::numbers::{Mount, point_of, region_of, set_mount, tolerance_ns};
+use voxtile_pipeline::numbers::{Mount, point_of, region_of, set_mount, step_of_points_m, tolerance_ns};
 
 pub fn read_options(args: &ReadArgs) -> Result<ReadOptions> {
     let mut options = ReadOptions::default();
@@ -22,6 +22,7 @@ pub fn read_options(args: &ReadArgs) -> Result<ReadOptions> {
     selection.every = args.every;
     selection.ignored =
         args.ignore_box.as_deref().map(|corners| region_of("ignore_box", corners)).transpose()?;
+    selection.step_m = args.round_points.map(step_of_points_m).transpose()?;
     options.classes.only_class.clone_from(&args.only_class);
     options.classes.skip_class.clone_from(&args.skip_class);
     options.returns = match args.returns {

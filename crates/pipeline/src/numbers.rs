@@ -50,6 +50,20 @@ pub fn tolerance_ns(seconds: f64) -> Result<i64> {
     }
 }
 
+/// Checks the step of `round_points`, in metres.
+///
+/// # Errors
+///
+/// The value is not a valid step.
+pub fn step_of_points_m(step_m: f64) -> Result<f64> {
+    match (1e-6..=1.0).contains(&step_m) {
+        true => Ok(step_m),
+        false => {
+            Err(Error::argument("round_points", format!("{step_m} is not a step in metres from 1e-6 to 1")))
+        }
+    }
+}
+
 /// Pose of the sensor in the body.
 #[derive(Clone, Copy, Debug)]
 pub struct Mount {

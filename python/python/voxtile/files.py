@@ -44,6 +44,7 @@ class ReadOptions(TypedDict, total=False):
     deskew: bool
     ignore_box: _Corners | None
     ignore_frame: Literal["sensor", "body"]
+    round_points: float | None
     only_class: Sequence[int]
     skip_class: Sequence[int]
     returns: Literal["all", "first", "last"]

@@ -55,6 +55,10 @@ pub struct ReadArgs {
     /// Frame of --ignore-box; body needs --extrinsic
     #[arg(long, value_name = "FRAME", default_value = "sensor")]
     pub ignore_frame: FrameName,
+    /// Round coordinates of points to multiples of this step, in metres, such as 0.001. Loses information; kept scans of
+    /// lidars take about half the space
+    #[arg(long, value_name = "M")]
+    pub round_points: Option<f64>,
     /// Read only points of these classes, such as 2,6: of LAS, .label files, and fields label or class [default: all]
     #[arg(long, value_name = "CLASSES", value_delimiter = ',')]
     pub only_class: Vec<u8>,

@@ -21,6 +21,9 @@ pub struct Selection {
     pub ignored: Option<Aabb>,
     /// Pose of the sensor in the body, if the box is in the body frame. `None`: the box is in the sensor frame.
     pub body_from_sensor: Option<Pose>,
+    /// Coordinates are rounded to multiples of this step, in metres, which loses information. Kept scans then take less
+    /// space.
+    pub step_m: Option<f64>,
     /// Scans of earlier inputs; `None` if each input is selected from alone.
     so_far: Option<Arc<SoFar>>,
 }
@@ -34,14 +37,26 @@ struct SoFar {
 
 impl Default for Selection {
     fn default() -> Self {
-        Self { first: 0, count: None, every: 1, ignored: None, body_from_sensor: None, so_far: None }
+        Self {
+            first: 0,
+            count: None,
+            every: 1,
+            ignored: None,
+            body_from_sensor: None,
+            step_m: None,
+            so_far: None,
+        }
     }
 }
 
 impl Selection {
-    /// Returns whether all scans and points are selected.
+    /// Returns whether all scans and points are selected, as they are.
     pub fn is_everything(&self) -> bool {
-        self.first == 0 && self.count.is_none() && self.every <= 1 && self.ignored.is_none()
+        self.first == 0 && self.count.is_none() && self.every <= 1 && !self.changes_points()
+    }
+
+    fn changes_points(&self) -> bool {
+        self.ignored.is_some() || self.step_m.is_some()
     }
 
     /// Selects from the sequence of all sources to which clones of the result are applied, one source after the other.
@@ -141,13 +156,16 @@ impl SelectedScans {
         Ok(true)
     }
 
-    fn read_without_ignored(&mut self, points: &mut PointStore, ignored: &Aabb) -> Result<Option<ScanHead>> {
+    /// Reads a scan without the ignored points, and rounds the others.
+    fn read_changed(&mut self, points: &mut PointStore) -> Result<Option<ScanHead>> {
+        let Selection { ignored, step_m, .. } = self.selection;
         let budget: PointBudget = points.budget().clone();
         self.unfiltered = PointStore::new(budget);
         let head = self.source.read_scan(&mut self.unfiltered)?;
         points.begin_with(self.unfiltered.has_intensities(), self.unfiltered.attributes());
         let to_body = self.selection.body_from_sensor.as_ref().map(Pose::to_world);
         let is_ignored = |point: [f64; 3]| {
+            let Some(ignored) = ignored else { return false };
             let point = to_body.as_ref().map_or(point, |to_body| to_body(point));
             (0..3).all(|k| ignored.min[k] <= point[k] && point[k] <= ignored.max[k])
         };
@@ -168,6 +186,7 @@ impl SelectedScans {
                         let intensity = intensities.map_or(0.0, |intensities| intensities[number]);
                         let (colour, class) = (attributes.colour(number), attributes.class(number));
                         let time_ns = attributes.time_ns(number);
+                        let point = step_m.map_or(point, |step_m| rounded(point, step_m));
                         outcome = points.push_with(point, intensity, colour, class, time_ns);
                         if outcome.is_err() {
                             return false;
@@ -186,6 +205,16 @@ impl SelectedScans {
     }
 }
 
+/// Rounds the coordinates of a point to multiples of a step. Rays without a return, whose ends are far away, and a point
+/// that would become one stay as they are.
+fn rounded(point: [f64; 3], step_m: f64) -> [f64; 3] {
+    /// Longest distance of a measured point, in metres.
+    const MAX_M: f64 = 1e7;
+    let rounded = point.map(|m| (m / step_m).round() * step_m);
+    let is_point = rounded != [0.0; 3] && point.iter().all(|m| m.abs() <= MAX_M);
+    if is_point { rounded } else { point }
+}
+
 impl ScanSource for SelectedScans {
     fn len_hint(&self) -> Option<usize> {
         let [passed, taken] = self.earlier;
@@ -199,9 +228,9 @@ impl ScanSource for SelectedScans {
         if !self.seek()? {
             return Ok(None);
         }
-        let head = match self.selection.ignored {
-            None => self.source.read_scan(points)?,
-            Some(ignored) => self.read_without_ignored(points, &ignored)?,
+        let head = match self.selection.changes_points() {
+            false => self.source.read_scan(points)?,
+            true => self.read_changed(points)?,
         };
         if head.is_some() {
             self.take();
@@ -243,6 +272,9 @@ impl ScanSource for SelectedScans {
         let mut remarks = self.source.remarks();
         if self.bad > 0 {
             remarks.push(format!("{} of the skipped scans cannot be read", self.bad));
+        }
+        if let Some(step_m) = self.selection.step_m {
+            remarks.push(format!("coordinates of points are rounded to multiples of {step_m} m"));
         }
         remarks
     }

@@ -437,3 +437,19 @@ fn selections_without_effect_are_refused() {
         assert!(error.starts_with("returns: ") && error.contains(name), "{error}");
     }
 }
+
+#[test]
+fn points_are_rounded_to_a_step() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.xyz");
+    std::fs::write(&path, "0.1 0.37 -0.13\n2.5 -7.1 0.05\n0.01 0.02 0.03\n").unwrap();
+    let mut options = ReadOptions { poses: Some("identity".into()), ..ReadOptions::default() };
+    options.selection.step_m = Some(0.25);
+    let mut source = open_scans(&path, &options).unwrap();
+    let scan = source.next_scan().unwrap().unwrap();
+    // The last one would become a point without a return.
+    assert_eq!(scan.points_in_sensor, [[0.0, 0.25, -0.25], [2.5, -7.0, 0.0], [0.01, 0.02, 0.03]]);
+    assert!(source.next_scan().unwrap().is_none());
+    let remarks = source.remarks();
+    assert!(remarks.iter().any(|remark| remark.contains("multiples of 0.25 m")), "{remarks:?}");
+}
