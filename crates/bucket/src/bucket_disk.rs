@@ -1,14 +1,12 @@
 use super::bucket::{Bucket, missing_object};
 use super::file_list::FileList;
 use super::manifest::{PART_BYTES, StoredFile};
+use super::part_cache::PartCache;
 use super::part_reader::PartReader;
-use super::pending::Pending;
-use bytes::Bytes;
-use lru::LruCache;
 use object_store::UpdateVersion;
 use std::io;
 use std::path::{Path, PathBuf};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::Arc;
 use voxtile::scratch::Scratch;
 use voxtile::store::{Disk, DiskLock, DiskRead, DiskWrite, EntryKind, MapPath, ReaderWatch};
 use voxtile::{Error, Result};
@@ -24,19 +22,15 @@ pub struct BucketDisk {
     list: FileList,
     /// Version of the manifest.
     version: UpdateVersion,
-    ahead: Mutex<Ahead>,
+    parts: Arc<PartCache>,
 }
 
-/// Files that were requested but not opened yet.
-#[derive(Debug)]
-struct Ahead {
-    files: LruCache<String, (u64, Pending<Bytes>)>,
-    bytes: u64,
-}
-
-/// Number of files that a reader prefetches, and maximum size of all prefetched files in bytes.
+/// Number of files that a reader prefetches.
 const FILES_AHEAD: usize = 16;
-const BYTES_AHEAD: u64 = 2 * PART_BYTES;
+
+/// Maximum size of prefetched files, and of parts that several readers use, in bytes: the current and the next part of
+/// points and of their marks.
+const CACHED_BYTES: u64 = 4 * PART_BYTES;
 
 impl BucketDisk {
     /// Opens the map in a bucket, and reads its manifest.
@@ -49,9 +43,9 @@ impl BucketDisk {
         Ok(Self {
             root: bucket.path().to_owned(),
             list: FileList::new(bucket.clone(), found.manifest),
+            parts: Arc::new(PartCache::new(bucket.clone(), CACHED_BYTES)),
             bucket,
             version: found.version,
-            ahead: Mutex::new(Ahead { files: LruCache::unbounded(), bytes: 0 }),
         })
     }
 
@@ -70,39 +64,9 @@ impl BucketDisk {
     fn open_from(&self, path: &Path, offset: u64) -> io::Result<Box<dyn DiskRead>> {
         let name = self.path_in_map(path).ok_or(io::ErrorKind::NotFound)?;
         let file: StoredFile = self.list.file(&name)?.ok_or(io::ErrorKind::NotFound)?;
-        let first = if offset == 0 { self.ahead().take(&name) } else { None };
-        Ok(Box::new(PartReader::new(self.bucket.clone(), file, offset, first)?))
-    }
-
-    fn ahead(&self) -> MutexGuard<'_, Ahead> {
-        self.ahead.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-}
-
-impl Ahead {
-    fn take(&mut self, name: &str) -> Option<Pending<Bytes>> {
-        let (bytes, pending) = self.files.pop(name)?;
-        self.bytes -= bytes;
-        Some(pending)
-    }
-
-    /// Requests a file, unless another thread has already requested it.
-    fn request(&mut self, name: String, bytes: u64, fetch: impl FnOnce() -> Pending<Bytes>) {
-        if self.files.contains(&name) {
-            return;
-        }
-        self.free_space(bytes);
-        self.files.put(name, (bytes, fetch()));
-        self.bytes += bytes;
-    }
-
-    /// Frees space for a file: drops the oldest requests that no reader has used.
-    fn free_space(&mut self, bytes: u64) {
-        while (self.files.len() >= 2 * FILES_AHEAD || self.bytes + bytes > BYTES_AHEAD)
-            && let Some((_, (dropped, _))) = self.files.pop_lru()
-        {
-            self.bytes -= dropped;
-        }
+        // The scans of a segment are opened one by one, and a catalog several times. A tile is read once.
+        let keeps = self.list.is_own(&name);
+        Ok(Box::new(PartReader::new(self.parts.clone(), file, offset, keeps)?))
     }
 }
 
@@ -175,12 +139,9 @@ impl Disk for BucketDisk {
 
     fn read_ahead(&self, path: &Path) {
         let Some(name) = self.path_in_map(path) else { return };
-        if self.ahead().files.contains(&name) {
-            return;
-        }
         let Ok(Some(file)) = self.list.file(&name) else { return };
         let &[part] = &file.parts[..] else { return };
-        self.ahead().request(name, file.bytes, || self.bucket.fetch(part, PART_BYTES));
+        self.parts.request(part, file.bytes);
     }
 
     fn watch(&self, _: &Path) -> io::Result<Box<dyn ReaderWatch>> {
@@ -225,26 +186,5 @@ impl Disk for BucketDisk {
 
     fn lock(&self, _: &Path) -> io::Result<Option<Box<dyn DiskLock>>> {
         read_only()
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::object_name::ObjectName;
-    use object_store::memory::InMemory;
-
-    #[test]
-    fn a_file_that_two_threads_request_is_counted_once() {
-        let bucket = Bucket::on(Arc::new(InMemory::new()), "map", "s3://test/map").unwrap();
-        let mut ahead = Ahead { files: LruCache::unbounded(), bytes: 0 };
-        for name in ["a", "b", "a"] {
-            ahead.request(name.to_owned(), 10, || bucket.fetch(ObjectName::of(b""), 10));
-        }
-        assert_eq!((ahead.files.len(), ahead.bytes), (2, 20));
-        for name in ["a", "b"] {
-            assert!(ahead.take(name).is_some());
-        }
-        assert_eq!(ahead.bytes, 0);
     }
 }

@@ -34,6 +34,7 @@ mod file_list;
 mod known_states;
 mod manifest;
 mod object_name;
+mod part_cache;
 mod part_reader;
 mod pending;
 mod prune;

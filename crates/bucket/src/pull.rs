@@ -3,13 +3,13 @@ use super::file_list::FileList;
 use super::known_states::{BUCKET_STATES, BUCKET_STATES_NEXT, KnownStates};
 use super::manifest::{Manifest, PART_BYTES, StoredFile};
 use super::object_name::ObjectName;
+use super::part_cache::PartCache;
 use super::part_reader::PartReader;
-use super::pending::Pending;
-use bytes::Bytes;
 use serde::Serialize;
 use std::collections::{BTreeSet, VecDeque};
 use std::io::{self, Read, Write};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use voxtile::store::{
     Disk, DiskRead, EntryKind, FileChecksum, FsDisk, KEPT_SCANS, Layout, MapPath, SNAPSHOTS, TileFile,
     TileStore, WriterLock, hex, staging_folder, tile_of_folder,
@@ -35,6 +35,9 @@ pub struct Pulled {
 
 /// Maximum number of files whose first part is requested before they are written.
 const MAX_IN_FLIGHT: usize = 8;
+
+/// Maximum size of their parts, of the file that is begun, and of the next part of the file that is written.
+const BYTES_IN_FLIGHT: u64 = (MAX_IN_FLIGHT as u64 + 2) * PART_BYTES;
 
 /// Downloads a map from a bucket into a folder. The map is assembled in `MAP.unfinished` and renamed at the end. A
 /// later pull reuses the files of an interrupted one. `progress` receives the bytes done and the bytes of all files.
@@ -71,6 +74,7 @@ pub fn pull(
         disk,
         folder: &unfinished,
         earlier,
+        parts: Arc::new(PartCache::new(bucket.clone(), BYTES_IN_FLIGHT)),
         in_flight: VecDeque::new(),
         pulled,
         progress,
@@ -194,8 +198,9 @@ struct Pull<'a, P> {
     disk: FsDisk,
     folder: &'a Path,
     earlier: Option<Earlier>,
+    parts: Arc<PartCache>,
     /// Files to write, in order.
-    in_flight: VecDeque<(PathBuf, StoredFile, Option<Pending<Bytes>>)>,
+    in_flight: VecDeque<(PathBuf, StoredFile)>,
     pulled: Pulled,
     progress: P,
     all_bytes: u64,
@@ -283,18 +288,20 @@ impl<P: FnMut(u64, u64)> Pull<'_, P> {
                 return Ok(());
             }
         }
-        let first = file.parts.first().map(|first| self.bucket.fetch(*first, PART_BYTES));
-        self.in_flight.push_back((place.to_owned(), file.clone(), first));
+        if let Some(first) = file.parts.first() {
+            self.parts.request(*first, file.bytes_of_part(0));
+        }
+        self.in_flight.push_back((place.to_owned(), file.clone()));
         Ok(())
     }
 
     /// Writes the file that was requested first.
     fn finish_file(&mut self) -> Result<()> {
-        let Some((place, file, first)) = self.in_flight.pop_front() else { return Ok(()) };
+        let Some((place, file)) = self.in_flight.pop_front() else { return Ok(()) };
         self.pulled.files_fetched += 1;
         self.pulled.bytes_fetched += file.bytes;
         let failed = |error| Error::io(&place, "fetch", error);
-        let mut input = PartReader::new(self.bucket.clone(), file, 0, first).map_err(failed)?;
+        let mut input = PartReader::new(self.parts.clone(), file, 0, false).map_err(failed)?;
         let mut out = self.disk.create(&place).map_err(failed)?;
         io::copy(&mut input, &mut out).and_then(|_| out.flush()).map_err(failed)
     }

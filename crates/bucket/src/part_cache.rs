@@ -1,0 +1,139 @@
+use super::bucket::Bucket;
+use super::manifest::PART_BYTES;
+use super::object_name::ObjectName;
+use super::pending::Pending;
+use bytes::Bytes;
+use lru::LruCache;
+use std::io;
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+/// Parts of files that were requested ahead, or that another reader may need again. The least recently used are dropped
+/// beyond a limit in bytes.
+#[derive(Debug)]
+pub(super) struct PartCache {
+    bucket: Bucket,
+    parts: Mutex<Parts>,
+}
+
+#[derive(Debug)]
+struct Parts {
+    parts: LruCache<ObjectName, (u64, Part)>,
+    /// Total size of the parts, in bytes.
+    bytes: u64,
+    max_bytes: u64,
+}
+
+#[derive(Debug)]
+enum Part {
+    Requested(Pending<Bytes>),
+    Fetched(Bytes),
+}
+
+impl PartCache {
+    pub(super) fn new(bucket: Bucket, max_bytes: u64) -> Self {
+        let parts = Parts { parts: LruCache::unbounded(), bytes: 0, max_bytes };
+        Self { bucket, parts: Mutex::new(parts) }
+    }
+
+    /// Starts to fetch a part of this size, unless the cache has it.
+    pub(super) fn request(&self, name: ObjectName, bytes: u64) {
+        self.parts().request(name, bytes, || self.bucket.fetch(name, PART_BYTES));
+    }
+
+    /// Returns a part, and with `keeps` retains it for other readers.
+    pub(super) fn get(&self, name: ObjectName, keeps: bool) -> io::Result<Bytes> {
+        let found = self.parts().take(name, keeps);
+        let content = match found {
+            Some(Part::Fetched(content)) => return Ok(content),
+            Some(Part::Requested(pending)) => pending.wait()?,
+            None => self.bucket.fetch(name, PART_BYTES).wait()?,
+        };
+        if keeps {
+            let bytes = content.len() as u64;
+            self.parts().put(name, bytes, Part::Fetched(content.clone()));
+        }
+        Ok(content)
+    }
+
+    fn parts(&self) -> MutexGuard<'_, Parts> {
+        self.parts.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl Parts {
+    fn request(&mut self, name: ObjectName, bytes: u64, fetch: impl FnOnce() -> Pending<Bytes>) {
+        if !self.parts.contains(&name) {
+            self.put(name, bytes, Part::Requested(fetch()));
+        }
+    }
+
+    fn put(&mut self, name: ObjectName, bytes: u64, part: Part) {
+        self.remove(name);
+        while self.bytes + bytes > self.max_bytes
+            && let Some((_, (dropped, _))) = self.parts.pop_lru()
+        {
+            self.bytes -= dropped;
+        }
+        self.parts.put(name, (bytes, part));
+        self.bytes += bytes;
+    }
+
+    /// Returns a part. With `keeps`, a fetched part remains in the cache.
+    fn take(&mut self, name: ObjectName, keeps: bool) -> Option<Part> {
+        match self.parts.get(&name) {
+            Some((_, Part::Fetched(content))) if keeps => Some(Part::Fetched(content.clone())),
+            _ => self.remove(name),
+        }
+    }
+
+    fn remove(&mut self, name: ObjectName) -> Option<Part> {
+        let (bytes, part) = self.parts.pop(&name)?;
+        self.bytes -= bytes;
+        Some(part)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use object_store::memory::InMemory;
+    use std::sync::Arc;
+
+    fn cache(max_bytes: u64) -> PartCache {
+        let bucket = Bucket::on(Arc::new(InMemory::new()), "map", "s3://test/map").unwrap();
+        PartCache::new(bucket, max_bytes)
+    }
+
+    #[test]
+    fn a_part_that_two_threads_request_is_counted_once() {
+        let cache = cache(100);
+        let [a, b] = ["a", "b"].map(|text| ObjectName::of(text.as_bytes()));
+        for name in [a, b, a] {
+            cache.request(name, 10);
+        }
+        assert_eq!((cache.parts().parts.len(), cache.parts().bytes), (2, 20));
+        for name in [a, b] {
+            assert!(matches!(cache.parts().take(name, false), Some(Part::Requested(_))));
+        }
+        assert_eq!(cache.parts().bytes, 0);
+    }
+
+    #[test]
+    fn the_least_recently_used_parts_are_dropped() {
+        let cache = cache(100);
+        let names: Vec<_> = (0..4_u8).map(|number| ObjectName::of(&[number])).collect();
+        let fetched = || Part::Fetched(Bytes::from_static(b"x"));
+        for name in &names[..2] {
+            cache.parts().put(*name, 45, fetched());
+        }
+        assert_eq!(cache.get(names[0], true).unwrap(), "x");
+        cache.parts().put(names[2], 45, fetched());
+        assert!(cache.parts().take(names[1], true).is_none(), "the older part");
+        assert!(cache.parts().take(names[0], true).is_some());
+        // A part that exceeds the limit alone is kept until the next one.
+        cache.parts().put(names[3], 200, fetched());
+        assert_eq!((cache.parts().parts.len(), cache.parts().bytes), (1, 200));
+        cache.parts().put(names[0], 45, fetched());
+        assert_eq!((cache.parts().parts.len(), cache.parts().bytes), (1, 45));
+    }
+}

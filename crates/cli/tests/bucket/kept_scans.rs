@@ -1,0 +1,258 @@
+//! Kept scans in a bucket: what a push sends, what readers fetch, and lost or damaged segments.
+
+use crate::city::{KEEP, PRUNE, RESEND, add_scans, assert_whole, city, digest, message_of, open, push_now};
+use crate::faulty_store::{Fault, FaultyStore, Kind};
+use crate::server::Server;
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use tempfile::TempDir;
+use testkit::random_scans::Random;
+use voxtile::integrity::verify;
+use voxtile::mapper::KeptSummary;
+use voxtile::operations::{NewPoses, Remap, rebuild_with_poses, remap, snapshot};
+use voxtile::scan::Stop;
+use voxtile::{
+    MapConfig, MapReader, MapView, Mapper, OutOfCoreTileMapper, Pose, Result, ScanRef, SnapshotName, Storage,
+};
+use voxtile_bucket::object_store::path::Path as Key;
+use voxtile_bucket::{Bucket, BucketDisk, Pushed, pull, push};
+use voxtile_pipeline::scan_digest;
+
+const MIB: u64 = 1 << 20;
+
+/// Some points per scan are more than the engine holds in memory, so it reads them several times.
+const POINTS: usize = 280_000;
+
+fn config() -> MapConfig {
+    let mut config = MapConfig::new(0.5, 8.0).unwrap().with_range(0.0, 0.6).with_storage(Storage::Compact);
+    config.keeps_scans = true;
+    config
+}
+
+fn pose(number: u64, y_m: f64) -> Pose {
+    Pose::from_quaternion([3.0 * number as f64, y_m, 0.2], [0.0, 0.0, 0.0, 1.0]).unwrap()
+}
+
+/// Inserts scans of random points, which compress little, and flushes.
+fn insert(mapper: &mut OutOfCoreTileMapper, numbers: std::ops::Range<u64>, points: usize) {
+    for number in numbers {
+        let mut random = Random(number);
+        let points: Vec<_> = (0..points).map(|_| random.point([0.0; 3], 5.0)).collect();
+        mapper.insert_points(&ScanRef::in_sensor(pose(number, 0.0), &points)).unwrap();
+    }
+    mapper.flush().unwrap();
+}
+
+/// Creates a map whose segment has several parts, the last of them full to a half.
+fn long_drive(map: &Path) -> OutOfCoreTileMapper {
+    let mut mapper = OutOfCoreTileMapper::create(map, config()).unwrap();
+    insert(&mut mapper, 0..7, POINTS);
+    let bytes = segment_bytes(map);
+    assert!(bytes > 33 * MIB && bytes % (16 * MIB) > 2 * MIB, "{bytes}");
+    mapper
+}
+
+fn segment_bytes(map: &Path) -> u64 {
+    let files = std::fs::read_dir(map.join("kept_scans")).unwrap().map(|entry| entry.unwrap());
+    let segments = files.filter(|file| file.file_name().to_string_lossy().starts_with("segment"));
+    segments.map(|file| file.metadata().unwrap().len()).sum()
+}
+
+fn scans_there(bucket: &Bucket) -> Result<String> {
+    Ok(scan_digest(&open(bucket)?)?.to_string())
+}
+
+fn scans_of(map: &Path) -> String {
+    scan_digest(&MapReader::open(map, 0).unwrap()).unwrap().to_string()
+}
+
+/// Makes a new map from the scans of another one.
+fn rebuilt(from: &MapReader, output: PathBuf, poses: &NewPoses) -> Result<String> {
+    rebuild_with_poses(from, &*output, config(), |rays| *rays, poses, &Stop::default(), |_, _| ())?;
+    Ok(digest(&output))
+}
+
+/// Numbers of requests and bytes, by object.
+fn fetched(store: &FaultyStore, server: &Server, from: usize) -> BTreeMap<String, (usize, u64)> {
+    let mut fetched = BTreeMap::new();
+    for request in store.requests(Kind::Get).into_iter().skip(from) {
+        let bytes = request.bytes.unwrap_or_else(|| server.get(&Key::from(request.key.clone())).len() as u64);
+        let (count, all) = fetched.entry(request.key).or_insert((0, 0));
+        (*count, *all) = (*count + 1, *all + bytes);
+    }
+    fetched
+}
+
+/// A new map from the scans in a bucket equals the map of a changed copy, and each part of the archive is fetched once.
+#[test]
+fn kept_scans_are_fetched_once() {
+    let (server, folder) = (Server::new(), TempDir::new().unwrap());
+    let at = |name: &str| folder.path().join(name);
+    drop(long_drive(&at("map")));
+    push_now(&at("map"), &server.bucket());
+    let store = FaultyStore::new(server.store.clone(), |_, _| Fault::None);
+    let bucket = Bucket::on(store.clone(), "maps/city", "s3://test/maps/city").unwrap();
+
+    let poses = NewPoses::InOrder((0..7).map(|number| pose(number, 0.4 * number as f64)).collect());
+    let from = store.requests(Kind::Get).len();
+    let moved = rebuilt(&open(&bucket).unwrap(), at("moved"), &poses).unwrap();
+    let of_rebuild = fetched(&store, &server, from);
+    let from = store.requests(Kind::Get).len();
+    assert_eq!(scans_there(&bucket).unwrap(), scans_of(&at("map")));
+    let of_digest = fetched(&store, &server, from);
+    for fetched in [of_rebuild, of_digest] {
+        for (key, (count, _)) in &fetched {
+            assert_eq!(*count, 1, "{key}");
+        }
+        let bytes: u64 = fetched.values().map(|(_, bytes)| bytes).sum();
+        assert!(bytes < segment_bytes(&at("map")) + MIB / 2, "{bytes} bytes: {fetched:?}");
+    }
+
+    pull(&bucket, at("copy"), false, |_, _| {}).unwrap();
+    remap(&KeptSummary::read(at("copy").as_path()).unwrap(), &poses, &Remap::default(), |_, _| {}).unwrap();
+    assert_eq!(digest(&at("copy")), moved);
+    assert_ne!(digest(&at("map")), moved);
+}
+
+/// A push sends new segments and the end of the segment being written, but no segment again.
+#[test]
+fn a_push_sends_only_new_scans() {
+    let (server, folder) = (Server::new(), TempDir::new().unwrap());
+    let (map, bucket) = (folder.path().join("map"), server.bucket());
+    let mut mapper = long_drive(&map);
+    let of_segments = |before: u64| segment_bytes(&map) - before;
+    let first = push_now(&map, &bucket);
+    assert!(first.bytes_sent > of_segments(0));
+
+    // The same writer appends to its segment, whose last part is sent again.
+    let before = segment_bytes(&map);
+    insert(&mut mapper, 7..8, POINTS / 100);
+    let same_writer = push_now(&map, &bucket);
+    let tail = before % (16 * MIB) + of_segments(before);
+    assert!((tail..tail + MIB / 2).contains(&same_writer.bytes_sent), "{same_writer:?}");
+    drop(mapper);
+
+    // The next writer begins a new segment.
+    let before = segment_bytes(&map);
+    insert(&mut OutOfCoreTileMapper::open(&map, config()).unwrap(), 8..9, POINTS / 100);
+    let next_writer = push_now(&map, &bucket);
+    let new = of_segments(before);
+    assert!((new..new + MIB / 2).contains(&next_writer.bytes_sent), "{next_writer:?}");
+    assert_eq!(scans_there(&bucket).unwrap(), scans_of(&map));
+
+    // New poses change the catalog, but no points.
+    let summary = KeptSummary::read(map.as_path()).unwrap();
+    let poses = NewPoses::Numbered(vec![(9, pose(8, 1.0))]);
+    remap(&summary, &poses, &Remap::default(), |_, _| {}).unwrap();
+    let remapped = push_now(&map, &bucket);
+    assert!(remapped.bytes_sent < MIB / 2, "{remapped:?}");
+    assert_eq!(scans_there(&bucket).unwrap(), scans_of(&map));
+}
+
+/// Returns the objects of the files in `kept_scans/`, by path.
+fn objects_of_scans(server: &Server) -> BTreeMap<String, Key> {
+    let manifest = server.get(&Key::from("maps/city/manifest.json"));
+    let manifest: serde_json::Value = serde_json::from_slice(&manifest).unwrap();
+    let files = manifest["files"].as_object().unwrap().iter();
+    let of_scans = files.filter(|(path, _)| path.starts_with("kept_scans/"));
+    let first = |file: &serde_json::Value| {
+        Key::from(format!("maps/city/objects/{}", file["parts"][0].as_str().unwrap()))
+    };
+    of_scans.map(|(path, file)| (path.clone(), first(file))).collect()
+}
+
+/// Returns the findings of a check of the map in a bucket.
+fn findings(bucket: &Bucket) -> Result<Vec<String>> {
+    let (mut findings, disk) = (Vec::new(), BucketDisk::open(bucket.clone())?);
+    verify(disk.into_map_path(), |finding| findings.push(finding.to_string()), |_, _| {})?;
+    Ok(findings)
+}
+
+/// A lost, truncated or changed segment or catalog is an error that names its object, until it is sent again.
+#[test]
+fn damaged_kept_scans_are_named_and_sent_again() {
+    let (server, folder) = (Server::new(), TempDir::new().unwrap());
+    let (map, bucket) = (folder.path().join("map"), server.bucket());
+    drop(city(&map, Storage::OctoMap, true));
+    push_now(&map, &bucket);
+    let objects = objects_of_scans(&server);
+    assert_eq!(objects.len(), 2, "{objects:?}");
+    for (path, key) in objects {
+        let content = server.get(&key);
+        let mut changed = content.clone();
+        changed[content.len() / 2] ^= 1;
+        for broken in [None, Some(content[..content.len() / 2].to_vec()), Some(changed)] {
+            match broken {
+                Some(broken) => server.put(&key, broken),
+                None => server.delete(&key),
+            }
+            let name = key.filename().unwrap();
+            let of_digest = message_of(scans_there(&bucket));
+            let of_rebuild = message_of(rebuilt(
+                &open(&bucket).unwrap(),
+                folder.path().join("new"),
+                &NewPoses::Numbered(Vec::new()),
+            ));
+            let of_verify = findings(&bucket).unwrap().join("\n");
+            for message in [of_digest, of_rebuild, of_verify] {
+                let is_named = message.contains(name) && message.contains(&path);
+                assert!(is_named && message.contains("push --resend"), "{path}: {message}");
+            }
+            assert!(!folder.path().join("new").exists());
+            push(map.as_path(), &bucket, RESEND, |_, _| {}).unwrap();
+            assert_eq!(scans_there(&bucket).unwrap(), scans_of(&map));
+            assert_eq!(findings(&bucket).unwrap(), Vec::<String>::new());
+        }
+    }
+}
+
+/// Readers of an earlier push see its scans after the map was remapped and pushed, until a push prunes them. A snapshot
+/// retains its scans.
+#[test]
+fn a_push_after_a_remap_is_complete_and_prunes_unreferenced_scans() {
+    let (server, folder) = (Server::new(), TempDir::new().unwrap());
+    let (map, bucket) = (folder.path().join("map"), server.bucket());
+    let mut mapper = OutOfCoreTileMapper::create(&map, config()).unwrap();
+    insert(&mut mapper, 0..6, 200);
+    drop(mapper);
+    push_now(&map, &bucket);
+    let (before, mut reader) = (scans_of(&map), open(&bucket).unwrap());
+    let first_objects = objects_of_scans(&server);
+
+    let replay = |changed: &NewPoses| {
+        remap(&KeptSummary::read(map.as_path()).unwrap(), changed, &Remap::default(), |_, _| {}).unwrap();
+    };
+    replay(&NewPoses::InOrder((0..6).map(|number| pose(number, 1.0)).collect()));
+    push_now(&map, &bucket);
+    assert_eq!(scan_digest(&reader).unwrap().to_string(), before);
+    assert!(reader.refresh().unwrap());
+    assert_eq!(scan_digest(&reader).unwrap().to_string(), scans_of(&map));
+
+    // The points of a removed scan leave the bucket with a prune.
+    let selection = voxtile::operations::ScanSelection::Numbers(2, 3);
+    let how = voxtile::operations::Replay::default();
+    voxtile::operations::remove_scans(map.as_path(), &selection, false, &how, |_, _| {}).unwrap();
+    std::thread::sleep(std::time::Duration::from_millis(5));
+    let pruned: Pushed = push(map.as_path(), &bucket, PRUNE, |_, _| {}).unwrap();
+    assert!(pruned.objects_pruned > 0);
+    let left: BTreeSet<_> = server.objects().into_iter().collect();
+    let now = objects_of_scans(&server);
+    assert!(now.values().all(|key| left.contains(key)), "{now:?}");
+    assert!(first_objects.values().all(|key| !left.contains(key)), "{first_objects:?}");
+    assert_eq!(scans_there(&bucket).unwrap(), scans_of(&map));
+    let message = message_of(scan_digest(&reader));
+    assert!(message.contains("objects/") && message.contains("--prune"), "{message}");
+
+    let name = SnapshotName::new("before").unwrap();
+    snapshot(map.as_path(), &name).unwrap();
+    let of_snapshot = scans_of(&map);
+    replay(&NewPoses::InOrder((0..4).map(|number| pose(number, -1.0)).collect()));
+    push(map.as_path(), &bucket, PRUNE, |_, _| {}).unwrap();
+    let there = BucketDisk::open(bucket.clone()).unwrap().into_map_path();
+    let snapshot = MapReader::open_snapshot(there, &name, 0).unwrap();
+    assert_eq!(scan_digest(&snapshot).unwrap().to_string(), of_snapshot);
+    pull(&bucket, folder.path().join("pulled"), false, |_, _| {}).unwrap();
+    assert_whole(&folder.path().join("pulled"));
+    assert_eq!(scans_of(&folder.path().join("pulled")), scans_of(&map));
+}
