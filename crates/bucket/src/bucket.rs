@@ -480,7 +480,7 @@ pub(super) fn object_error(key: &Key, error: &object_store::Error) -> io::Error 
     io::Error::new(kind, format!("object {key}: {}", error_text(error)))
 }
 
-/// Replaces a `NotFound` error by one of another kind: the object is missing, but the map has the file.
+/// Replaces a `NotFound` error by damage: the object is missing, but the map has the file.
 pub(super) fn missing_object(error: io::Error) -> io::Error {
     if error.kind() != io::ErrorKind::NotFound {
         return error;
@@ -488,7 +488,7 @@ pub(super) fn missing_object(error: io::Error) -> io::Error {
     let reason = format!(
         "{error}; if another push used --prune, open the map again; otherwise {RESEND_HINT} from its folder"
     );
-    io::Error::other(reason)
+    io::Error::new(io::ErrorKind::InvalidData, reason)
 }
 
 /// Returns an error with its causes, on one line.

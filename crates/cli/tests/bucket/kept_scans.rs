@@ -1,11 +1,10 @@
 //! Kept scans in a bucket: what a push sends, what readers fetch, and lost or damaged segments.
 
-use crate::city::{KEEP, PRUNE, RESEND, add_scans, assert_whole, city, digest, message_of, open, push_now};
+use crate::city::{PRUNE, RESEND, assert_whole, city, digest, message_of, open, push_now};
 use crate::faulty_store::{Fault, FaultyStore, Kind};
 use crate::server::Server;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 use tempfile::TempDir;
 use testkit::random_scans::Random;
 use voxtile::integrity::verify;
@@ -13,7 +12,7 @@ use voxtile::mapper::KeptSummary;
 use voxtile::operations::{NewPoses, Remap, rebuild_with_poses, remap, snapshot};
 use voxtile::scan::Stop;
 use voxtile::{
-    MapConfig, MapReader, MapView, Mapper, OutOfCoreTileMapper, Pose, Result, ScanRef, SnapshotName, Storage,
+    MapConfig, MapReader, Mapper, OutOfCoreTileMapper, Pose, Result, ScanRef, SnapshotName, Storage,
 };
 use voxtile_bucket::object_store::path::Path as Key;
 use voxtile_bucket::{Bucket, BucketDisk, Pushed, pull, push};
@@ -218,7 +217,7 @@ fn a_push_after_a_remap_is_complete_and_prunes_unreferenced_scans() {
     drop(mapper);
     push_now(&map, &bucket);
     let (before, mut reader) = (scans_of(&map), open(&bucket).unwrap());
-    let first_objects = objects_of_scans(&server);
+    let (first_objects, unread) = (objects_of_scans(&server), open(&bucket).unwrap());
 
     let replay = |changed: &NewPoses| {
         remap(&KeptSummary::read(map.as_path()).unwrap(), changed, &Remap::default(), |_, _| {}).unwrap();
@@ -241,7 +240,7 @@ fn a_push_after_a_remap_is_complete_and_prunes_unreferenced_scans() {
     assert!(now.values().all(|key| left.contains(key)), "{now:?}");
     assert!(first_objects.values().all(|key| !left.contains(key)), "{first_objects:?}");
     assert_eq!(scans_there(&bucket).unwrap(), scans_of(&map));
-    let message = message_of(scan_digest(&reader));
+    let message = message_of(scan_digest(&unread));
     assert!(message.contains("objects/") && message.contains("--prune"), "{message}");
 
     let name = SnapshotName::new("before").unwrap();
