@@ -8,10 +8,11 @@ use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use voxtile::scratch::Scratch;
-use voxtile::store::{Disk, DiskLock, DiskRead, DiskWrite, EntryKind, MapPath, ReaderWatch};
+use voxtile::store::{Disk, DiskLock, DiskRead, DiskWrite, EntryKind, FsDisk, MapPath, ReaderWatch};
 use voxtile::{Error, Result};
 
-/// A map in a bucket as a read-only disk. It shows the last push at the time it was opened.
+/// A map in a bucket as a disk. The map is read-only, and is that of the last push at the time it was opened. All other
+/// paths are files of this machine, so that an operation can write a new map.
 ///
 /// While a reader visits tiles, the next tiles are prefetched, several at a time.
 #[derive(Debug)]
@@ -55,24 +56,34 @@ impl BucketDisk {
         MapPath::on(Arc::new(self), root)
     }
 
-    /// Returns the path of a file inside the map, with `/` between names; `None` if the path is outside the map.
+    /// Returns the path of a file inside the map, with `/` between names; `None` for a file of this machine.
     fn path_in_map(&self, path: &Path) -> Option<String> {
         let names = path.strip_prefix(&self.root).ok()?.iter();
-        names.map(|name| name.to_str()).collect::<Option<Vec<_>>>().map(|names| names.join("/"))
+        Some(names.map(|name| name.to_string_lossy()).collect::<Vec<_>>().join("/"))
+    }
+
+    /// Returns the disk of this machine to change a file.
+    ///
+    /// # Errors
+    ///
+    /// A path inside the map.
+    fn writable(&self, path: &Path) -> io::Result<FsDisk> {
+        match path.starts_with(&self.root) {
+            false => Ok(FsDisk),
+            true => {
+                let reason = "a map in a bucket is read-only; `voxtile pull` it, change it, `voxtile push` it";
+                Err(io::Error::new(io::ErrorKind::ReadOnlyFilesystem, reason))
+            }
+        }
     }
 
     fn open_from(&self, path: &Path, offset: u64) -> io::Result<Box<dyn DiskRead>> {
-        let name = self.path_in_map(path).ok_or(io::ErrorKind::NotFound)?;
+        let Some(name) = self.path_in_map(path) else { return FsDisk.open_at(path, offset) };
         let file: StoredFile = self.list.file(&name)?.ok_or(io::ErrorKind::NotFound)?;
         // The scans of a segment are opened one by one, and a catalog several times. A tile is read once.
         let keeps = self.list.is_own(&name);
         Ok(Box::new(PartReader::new(self.parts.clone(), file, offset, keeps)?))
     }
-}
-
-fn read_only<T>() -> io::Result<T> {
-    let reason = "a map in a bucket is read-only; `voxtile pull` it, change it, `voxtile push` it";
-    Err(io::Error::new(io::ErrorKind::ReadOnlyFilesystem, reason))
 }
 
 impl Disk for BucketDisk {
@@ -85,7 +96,7 @@ impl Disk for BucketDisk {
     }
 
     fn read_at(&self, path: &Path, offset: u64, bytes: usize) -> io::Result<Vec<u8>> {
-        let name = self.path_in_map(path).ok_or(io::ErrorKind::NotFound)?;
+        let Some(name) = self.path_in_map(path) else { return FsDisk.read_at(path, offset, bytes) };
         let file = self.list.file(&name)?.ok_or(io::ErrorKind::NotFound)?;
         let end = offset.saturating_add(bytes as u64).min(file.bytes);
         let (mut read, mut at) = (Vec::new(), offset);
@@ -106,11 +117,14 @@ impl Disk for BucketDisk {
     }
 
     fn open_shared(&self, path: &Path) -> io::Result<Box<dyn DiskRead>> {
-        self.open_from(path, 0)
+        match self.path_in_map(path) {
+            Some(_) => self.open_from(path, 0),
+            None => FsDisk.open_shared(path),
+        }
     }
 
     fn kind(&self, path: &Path) -> io::Result<Option<EntryKind>> {
-        let Some(name) = self.path_in_map(path) else { return Ok(None) };
+        let Some(name) = self.path_in_map(path) else { return FsDisk.kind(path) };
         if let Some(file) = self.list.file(&name)? {
             return Ok(Some(EntryKind::File(file.bytes)));
         }
@@ -119,7 +133,7 @@ impl Disk for BucketDisk {
     }
 
     fn list(&self, path: &Path) -> io::Result<Vec<String>> {
-        let name = self.path_in_map(path).ok_or(io::ErrorKind::NotFound)?;
+        let Some(name) = self.path_in_map(path) else { return FsDisk.list(path) };
         let names = self.list.names_in(&name)?;
         if names.is_empty() {
             return Err(io::ErrorKind::NotFound.into());
@@ -144,47 +158,67 @@ impl Disk for BucketDisk {
         self.parts.request(part, file.bytes);
     }
 
-    fn watch(&self, _: &Path) -> io::Result<Box<dyn ReaderWatch>> {
-        read_only()
+    fn resolve(&self, path: &Path) -> io::Result<PathBuf> {
+        match self.path_in_map(path) {
+            Some(_) => Ok(path.to_owned()),
+            None => FsDisk.resolve(path),
+        }
     }
 
-    fn create(&self, _: &Path) -> io::Result<Box<dyn DiskWrite>> {
-        read_only()
+    fn watch(&self, path: &Path) -> io::Result<Box<dyn ReaderWatch>> {
+        self.writable(path)?.watch(path)
     }
 
-    fn append(&self, _: &Path, _: u64) -> io::Result<Box<dyn DiskWrite>> {
-        read_only()
+    fn create(&self, path: &Path) -> io::Result<Box<dyn DiskWrite>> {
+        self.writable(path)?.create(path)
     }
 
-    fn sync_file(&self, _: &Path) -> io::Result<()> {
-        read_only()
+    fn append(&self, path: &Path, offset: u64) -> io::Result<Box<dyn DiskWrite>> {
+        self.writable(path)?.append(path, offset)
     }
 
-    fn sync_folder(&self, _: &Path) -> io::Result<()> {
-        read_only()
+    fn sync_file(&self, path: &Path) -> io::Result<()> {
+        self.writable(path)?.sync_file(path)
     }
 
-    fn rename(&self, _: &Path, _: &Path) -> io::Result<()> {
-        read_only()
+    fn sync_folder(&self, path: &Path) -> io::Result<()> {
+        self.writable(path)?.sync_folder(path)
     }
 
-    fn remove_file(&self, _: &Path) -> io::Result<()> {
-        read_only()
+    fn sync_all(&self, files: &[PathBuf], folders: &[PathBuf]) -> [Vec<io::Result<()>>; 2] {
+        // Only files of this machine are written.
+        FsDisk.sync_all(files, folders)
     }
 
-    fn create_folder(&self, _: &Path) -> io::Result<()> {
-        read_only()
+    fn rename(&self, from: &Path, to: &Path) -> io::Result<()> {
+        self.writable(from).and(self.writable(to))?.rename(from, to)
     }
 
-    fn remove_folder(&self, _: &Path) -> io::Result<()> {
-        read_only()
+    fn exchange(&self, first: &Path, second: &Path) -> io::Result<()> {
+        self.writable(first).and(self.writable(second))?.exchange(first, second)
     }
 
-    fn scratch(&self, _: &Path) -> io::Result<Box<dyn Scratch>> {
-        read_only()
+    fn link(&self, from: &Path, to: &Path) -> io::Result<()> {
+        self.writable(from).and(self.writable(to))?.link(from, to)
     }
 
-    fn lock(&self, _: &Path) -> io::Result<Option<Box<dyn DiskLock>>> {
-        read_only()
+    fn remove_file(&self, path: &Path) -> io::Result<()> {
+        self.writable(path)?.remove_file(path)
+    }
+
+    fn create_folder(&self, path: &Path) -> io::Result<()> {
+        self.writable(path)?.create_folder(path)
+    }
+
+    fn remove_folder(&self, path: &Path) -> io::Result<()> {
+        self.writable(path)?.remove_folder(path)
+    }
+
+    fn scratch(&self, folder: &Path) -> io::Result<Box<dyn Scratch>> {
+        self.writable(folder)?.scratch(folder)
+    }
+
+    fn lock(&self, path: &Path) -> io::Result<Option<Box<dyn DiskLock>>> {
+        self.writable(path)?.lock(path)
     }
 }
