@@ -60,8 +60,7 @@ pub use part::{AreaPart, Part};
 pub use remapping::{
     NewPoses, OnlineRemap, PointsRemoved, Rebuilt, Remap, RemapPart, Remapped, Replay, Replayed,
     ScanSelection, ScansRemoved, ScansWithout, SnapshotFailure, join_remap, mark_moving, rebuild,
-    rebuild_with_poses, remap,
-    remap_columns, remap_part, remove_points, remove_scans,
+    rebuild_with_poses, remap, remap_columns, remap_part, remove_points, remove_scans,
 };
 pub use replace_tiles::{TilesReplaced, replace_tiles};
 pub use revert::{Reverted, revert};

@@ -71,7 +71,8 @@ impl BucketDisk {
         match path.starts_with(&self.root) {
             false => Ok(FsDisk),
             true => {
-                let reason = "a map in a bucket is read-only; `voxtile pull` it, change it, `voxtile push` it";
+                let reason =
+                    "a map in a bucket is read-only; `voxtile pull` it, change it, `voxtile push` it";
                 Err(io::Error::new(io::ErrorKind::ReadOnlyFilesystem, reason))
             }
         }

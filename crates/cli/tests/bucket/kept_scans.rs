@@ -9,8 +9,13 @@ use tempfile::TempDir;
 use testkit::random_scans::Random;
 use voxtile::integrity::verify;
 use voxtile::mapper::KeptSummary;
-use voxtile::operations::{NewPoses, Remap, rebuild_with_poses, remap, snapshot};
+use voxtile::operations::{
+    CopyScans, NewPoses, Part, Remap, Replay, ScanSelection, convert, crop, merge, rebuild_with_poses, remap,
+    remove_scans, snapshot,
+};
 use voxtile::scan::Stop;
+use voxtile::space::Aabb;
+use voxtile::store::Disk;
 use voxtile::{
     MapConfig, MapReader, Mapper, OutOfCoreTileMapper, Pose, Result, ScanRef, SnapshotName, Storage,
 };
@@ -229,9 +234,8 @@ fn a_push_after_a_remap_is_complete_and_prunes_unreferenced_scans() {
     assert_eq!(scan_digest(&reader).unwrap().to_string(), scans_of(&map));
 
     // The points of a removed scan leave the bucket with a prune.
-    let selection = voxtile::operations::ScanSelection::Numbers(2, 3);
-    let how = voxtile::operations::Replay::default();
-    voxtile::operations::remove_scans(map.as_path(), &selection, false, &how, |_, _| {}).unwrap();
+    let selection = ScanSelection::Numbers(2, 3);
+    remove_scans(map.as_path(), &selection, false, &Replay::default(), |_, _| {}).unwrap();
     std::thread::sleep(std::time::Duration::from_millis(5));
     let pruned: Pushed = push(map.as_path(), &bucket, PRUNE, |_, _| {}).unwrap();
     assert!(pruned.objects_pruned > 0);
@@ -254,4 +258,61 @@ fn a_push_after_a_remap_is_complete_and_prunes_unreferenced_scans() {
     pull(&bucket, folder.path().join("pulled"), false, |_, _| {}).unwrap();
     assert_whole(&folder.path().join("pulled"));
     assert_eq!(scans_of(&folder.path().join("pulled")), scans_of(&map));
+}
+
+/// A part of a map in a bucket, the map in another storage, and its union with others become maps in folders, with their
+/// scans. They equal those of the map's folder.
+#[test]
+fn parts_and_unions_of_maps_in_buckets_are_written_to_folders() {
+    let (server, folder) = (Server::new(), TempDir::new().unwrap());
+    let at = |name: &str| folder.path().join(name);
+    let second = Bucket::on(server.store.clone(), "maps/second", "s3://test/maps/second").unwrap();
+    let made =
+        [("first", 0..4, server.bucket()), ("second", 20..23, second)].map(|(name, numbers, bucket)| {
+            insert(&mut OutOfCoreTileMapper::create(&at(name), config()).unwrap(), numbers, 300);
+            push_now(&at(name), &bucket);
+            (at(name), bucket)
+        });
+    let [(first, first_bucket), (second, second_bucket)] = &made;
+    let here = |map: &Path| MapReader::open(map, 1 << 20).unwrap();
+    let there = |bucket: &Bucket| open(bucket).unwrap();
+    let result = |name: &str| {
+        assert_whole(&at(name));
+        (digest(&at(name)), scans_of(&at(name)))
+    };
+
+    let part = Part::Inside(Aabb { min: [0.0; 3], max: [5.0, 4.0, 4.0] });
+    let cropped = [("here", here(first)), ("there", there(first_bucket))].map(|(name, map)| {
+        crop(&map, &part, CopyScans::Yes, at(name), |_, _| {}).unwrap();
+        result(name)
+    });
+    assert_eq!(cropped[0], cropped[1]);
+    let converted = at("converted");
+    convert(&there(first_bucket), &converted, Storage::OctoMap, CopyScans::Yes, |_, _| {}).unwrap();
+    assert_eq!(result("converted"), (digest(first), scans_of(first)));
+
+    let pairs = [
+        [here(first), here(second)],
+        [there(first_bucket), here(second)],
+        [here(first), there(second_bucket)],
+        [there(first_bucket), there(second_bucket)],
+    ];
+    let merged = pairs.iter().enumerate().map(|(number, maps)| {
+        let name = format!("merged {number}");
+        assert!(merge(maps, at(&name), None, |_, _| {}).unwrap().keeps_scans);
+        result(&name)
+    });
+    let merged: Vec<_> = merged.collect();
+    assert!(merged.iter().all(|one| one == &merged[0]), "{merged:?}");
+
+    // The map in the bucket remains read-only.
+    let inside = Path::new("s3://test/maps/city/new");
+    let refused = message_of(crop(&there(first_bucket), &part, CopyScans::No, inside, |_, _| {}));
+    assert!(refused.contains("is a URL"), "{refused}");
+    let (disk, outside) = (BucketDisk::open(first_bucket.clone()).unwrap(), at("new"));
+    for refused in [disk.create_folder(inside), disk.rename(&outside, inside), disk.remove_file(inside)] {
+        assert_eq!(refused.unwrap_err().kind(), std::io::ErrorKind::ReadOnlyFilesystem);
+    }
+    disk.create_folder(&outside).unwrap();
+    assert!(outside.is_dir());
 }
