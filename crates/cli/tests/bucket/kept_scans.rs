@@ -11,7 +11,7 @@ use voxtile::integrity::verify;
 use voxtile::mapper::KeptSummary;
 use voxtile::operations::{
     CopyScans, NewPoses, Part, Remap, Replay, ScanSelection, convert, crop, merge, rebuild_with_poses, remap,
-    remove_scans, snapshot,
+    remove_scans, revert, snapshot,
 };
 use voxtile::scan::Stop;
 use voxtile::space::Aabb;
@@ -119,6 +119,12 @@ fn kept_scans_are_fetched_once() {
     assert_ne!(digest(&at("map")), moved);
 }
 
+fn flip_byte(path: &Path, offset: u64) {
+    let mut content = std::fs::read(path).unwrap();
+    content[offset as usize] ^= 1;
+    std::fs::write(path, content).unwrap();
+}
+
 /// A push sends new segments and the end of the segment being written, but no segment again.
 #[test]
 fn a_push_sends_only_new_scans() {
@@ -140,7 +146,10 @@ fn a_push_sends_only_new_scans() {
     // The next writer begins a new segment.
     let before = segment_bytes(&map);
     insert(&mut OutOfCoreTileMapper::open(&map, config()).unwrap(), 8..9, POINTS / 100);
+    // The first parts of the old segment are not even read.
+    flip_byte(&map.join("kept_scans/segment.1"), 1000);
     let next_writer = push_now(&map, &bucket);
+    flip_byte(&map.join("kept_scans/segment.1"), 1000);
     let new = of_segments(before);
     assert!((new..new + MIB / 2).contains(&next_writer.bytes_sent), "{next_writer:?}");
     assert_eq!(scans_there(&bucket).unwrap(), scans_of(&map));
@@ -315,4 +324,57 @@ fn parts_and_unions_of_maps_in_buckets_are_written_to_folders() {
     }
     disk.create_folder(&outside).unwrap();
     assert!(outside.is_dir());
+}
+
+/// A pull that replaces an earlier state fetches new segments, and the end of one that has grown. It does not reuse damaged
+/// parts.
+#[test]
+fn a_pull_fetches_only_new_scans() {
+    let (server, folder) = (Server::new(), TempDir::new().unwrap());
+    let (map, pulled, bucket) = (folder.path().join("map"), folder.path().join("pulled"), server.bucket());
+    let mut mapper = long_drive(&map);
+    push_now(&map, &bucket);
+    pull(&bucket, &pulled, false, |_, _| {}).unwrap();
+    let before = segment_bytes(&map);
+    insert(&mut mapper, 7..8, POINTS / 100);
+    push_now(&map, &bucket);
+    let fetched = pull(&bucket, &pulled, true, |_, _| {}).unwrap().bytes_fetched;
+    let end = before % (16 * MIB) + segment_bytes(&map) - before;
+    assert!((end..end + MIB / 2).contains(&fetched), "{fetched} bytes, of {end}");
+    assert_whole(&pulled);
+    drop(mapper);
+
+    insert(&mut OutOfCoreTileMapper::open(&map, config()).unwrap(), 8..9, 100);
+    push_now(&map, &bucket);
+    let fetched = pull(&bucket, &pulled, true, |_, _| {}).unwrap().bytes_fetched;
+    assert!(fetched < MIB / 2, "{fetched} bytes");
+    insert(&mut OutOfCoreTileMapper::open(&map, config()).unwrap(), 9..10, 100);
+    push_now(&map, &bucket);
+    flip_byte(&pulled.join("kept_scans/segment.1"), 17 * MIB);
+    let fetched = pull(&bucket, &pulled, true, |_, _| {}).unwrap().bytes_fetched;
+    let damaged = segment_bytes(&map) - 16 * MIB;
+    assert!((damaged - MIB / 2..damaged + MIB / 2).contains(&fetched), "{fetched} bytes, of {damaged}");
+    assert_whole(&pulled);
+    assert_eq!(scans_of(&pulled), scans_of(&map));
+}
+
+/// After a revert, a new segment may have the name of one that the bucket has.
+#[test]
+fn another_segment_of_the_same_name_is_sent() {
+    let (server, folder) = (Server::new(), TempDir::new().unwrap());
+    let (map, bucket) = (folder.path().join("map"), server.bucket());
+    insert(&mut OutOfCoreTileMapper::create(&map, config()).unwrap(), 0..1, 100);
+    let name = SnapshotName::new("before").unwrap();
+    snapshot(map.as_path(), &name).unwrap();
+    let segment = map.join("kept_scans/segment.2");
+    let contents = [1..5, 11..15].map(|numbers| {
+        insert(&mut OutOfCoreTileMapper::open(&map, config()).unwrap(), numbers, POINTS);
+        push_now(&map, &bucket);
+        assert_eq!(scans_there(&bucket).unwrap(), scans_of(&map));
+        let content = std::fs::read(&segment).unwrap();
+        revert(map.as_path(), &name, None, |_, _| {}).unwrap();
+        assert!(!segment.exists());
+        content
+    });
+    assert!(contents[0].len() as u64 > 17 * MIB && contents[0] != contents[1]);
 }
