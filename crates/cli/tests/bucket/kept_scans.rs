@@ -278,7 +278,7 @@ fn parts_and_unions_of_maps_in_buckets_are_written_to_folders() {
     let second = Bucket::on(server.store.clone(), "maps/second", "s3://test/maps/second").unwrap();
     let made =
         [("first", 0..4, server.bucket()), ("second", 20..23, second)].map(|(name, numbers, bucket)| {
-            insert(&mut OutOfCoreTileMapper::create(&at(name), config()).unwrap(), numbers, 300);
+            insert(&mut OutOfCoreTileMapper::create(at(name), config()).unwrap(), numbers, 300);
             push_now(&at(name), &bucket);
             (at(name), bucket)
         });
