@@ -77,8 +77,8 @@ impl Bucket {
     /// Default [timeout](Bucket::with_timeout) of a request without progress.
     pub const DEFAULT_TIMEOUT: Duration = Duration::from_secs(60);
 
-    /// Opens the bucket and prefix of a URL: `s3://BUCKET/MAP`, `gs://BUCKET/MAP`, `az://CONTAINER/MAP`, or
-    /// `https://HOST/MAP`, which is read-only. Keys, region and endpoint are read from the environment variables of
+    /// Opens the bucket and prefix of a URL: `s3://BUCKET/MAP`, `gs://BUCKET/MAP`, `az://CONTAINER/MAP`
+    /// (or `abfs`, `abfss`), or `https://HOST/MAP` (or `http`), which is read-only. Keys, region and endpoint are read from the environment variables of
     /// each store's own tools: `AWS_ACCESS_KEY_ID`, `AWS_REGION`, `AWS_ENDPOINT_URL`, `GOOGLE_SERVICE_ACCOUNT`,
     /// `AZURE_STORAGE_ACCOUNT_NAME` and so on. `VOXTILE_BUCKET_TIMEOUT` is the [timeout](Bucket::with_timeout) in
     /// seconds.

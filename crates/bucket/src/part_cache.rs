@@ -6,6 +6,7 @@ use bytes::Bytes;
 use lru::LruCache;
 use std::io;
 use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
 
 /// Parts of files that were requested ahead, or that another reader may need again. The least recently used are dropped
 /// beyond a limit in bytes.
@@ -27,7 +28,13 @@ struct Parts {
 enum Part {
     Requested(Pending<Bytes>),
     Fetched(Bytes),
+    /// The object is missing or damaged.
+    Failed(io::ErrorKind, String, Instant),
 }
+
+/// Time after which a missing or damaged object is requested again. A segment has hundreds of scans, and each of them
+/// would be a download.
+const RETRY_AFTER: Duration = Duration::from_secs(30);
 
 impl PartCache {
     pub(super) fn new(bucket: Bucket, max_bytes: u64) -> Self {
@@ -43,16 +50,29 @@ impl PartCache {
     /// Returns a part, and with `keeps` retains it for other readers.
     pub(super) fn get(&self, name: ObjectName, keeps: bool) -> io::Result<Bytes> {
         let found = self.parts().take(name, keeps);
-        let content = match found {
+        let fetched = match found {
             Some(Part::Fetched(content)) => return Ok(content),
-            Some(Part::Requested(pending)) => pending.wait()?,
-            None => self.bucket.fetch(name, PART_BYTES).wait()?,
+            Some(Part::Failed(kind, reason, at)) if at.elapsed() < RETRY_AFTER => {
+                return Err(io::Error::new(kind, reason));
+            }
+            Some(Part::Requested(pending)) => pending.wait(),
+            _ => self.bucket.fetch(name, PART_BYTES).wait(),
         };
-        if keeps {
-            let bytes = content.len() as u64;
-            self.parts().put(name, bytes, Part::Fetched(content.clone()));
+        match &fetched {
+            Ok(content) if keeps => {
+                let bytes = content.len() as u64;
+                self.parts().put(name, bytes, Part::Fetched(content.clone()));
+            }
+            Err(error)
+                if keeps && matches!(error.kind(), io::ErrorKind::NotFound | io::ErrorKind::InvalidData) =>
+            {
+                let reason = error.to_string();
+                let bytes = reason.len() as u64;
+                self.parts().put(name, bytes, Part::Failed(error.kind(), reason, Instant::now()));
+            }
+            _ => {}
         }
-        Ok(content)
+        fetched
     }
 
     fn parts(&self) -> MutexGuard<'_, Parts> {
@@ -78,10 +98,13 @@ impl Parts {
         self.bytes += bytes;
     }
 
-    /// Returns a part. With `keeps`, a fetched part remains in the cache.
+    /// Returns a part. With `keeps`, it remains in the cache, unless it is still requested.
     fn take(&mut self, name: ObjectName, keeps: bool) -> Option<Part> {
         match self.parts.get(&name) {
             Some((_, Part::Fetched(content))) if keeps => Some(Part::Fetched(content.clone())),
+            Some((_, Part::Failed(kind, reason, at))) if keeps => {
+                Some(Part::Failed(*kind, reason.clone(), *at))
+            }
             _ => self.remove(name),
         }
     }
@@ -116,6 +139,24 @@ mod tests {
             assert!(matches!(cache.parts().take(name, false), Some(Part::Requested(_))));
         }
         assert_eq!(cache.parts().bytes, 0);
+    }
+
+    #[test]
+    fn a_missing_part_is_not_requested_for_each_reader() {
+        let store = Arc::new(InMemory::new());
+        let bucket = Bucket::on(store, "map", "s3://test/map").unwrap();
+        let cache = PartCache::new(bucket.clone(), 100);
+        let name = ObjectName::of(b"content");
+        let missing = |cache: &PartCache| cache.get(name, true).unwrap_err();
+        assert_eq!(missing(&cache).kind(), io::ErrorKind::NotFound);
+        bucket.put(name, Bytes::from_static(b"content"), false).wait().unwrap();
+        let again = missing(&cache);
+        assert!(
+            again.kind() == io::ErrorKind::NotFound && again.to_string().contains(&name.key()),
+            "{again}"
+        );
+        assert_eq!(cache.get(name, false).unwrap(), "content");
+        assert_eq!(PartCache::new(bucket, 100).get(name, true).unwrap(), "content");
     }
 
     #[test]

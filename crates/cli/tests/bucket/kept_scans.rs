@@ -220,6 +220,46 @@ fn damaged_kept_scans_are_named_and_sent_again() {
     }
 }
 
+/// A check of a map lists lost and changed objects of all files, and fetches each of them a few times at most.
+#[test]
+fn damaged_objects_are_findings() {
+    let (server, folder) = (Server::new(), TempDir::new().unwrap());
+    let map = folder.path().join("map");
+    drop(city(&map, Storage::OctoMap, true));
+    push_now(&map, &server.bucket());
+    let manifest = server.get(&Key::from("maps/city/manifest.json"));
+    let manifest: serde_json::Value = serde_json::from_slice(&manifest).unwrap();
+    let object =
+        |name: &serde_json::Value| Key::from(format!("maps/city/objects/{}", name.as_str().unwrap()));
+    let mut files = BTreeMap::new();
+    for page in manifest["pages"].as_object().unwrap().values() {
+        let page: serde_json::Value = serde_json::from_slice(&server.get(&object(page))).unwrap();
+        let of_page = page.as_object().unwrap().iter();
+        files.extend(of_page.map(|(path, file)| (path.clone(), object(&file["parts"][0]))));
+    }
+    // The table of a tile, the octree of another one, and a segment.
+    let nth = |name: &str, number: usize| {
+        files.iter().filter(|(path, _)| path.ends_with(name)).nth(number).unwrap().1.clone()
+    };
+    let segment = objects_of_scans(&server).remove("kept_scans/segment.1").unwrap();
+    let keys = [nth("iwlo_meta.bin", 0), nth("octree.bt", 5), segment];
+    let (last, others) = keys.split_last().unwrap();
+    others.iter().for_each(|key| server.delete(key));
+    server.put(last, b"other".to_vec());
+
+    let store = FaultyStore::new(server.store.clone(), |_, _| Fault::None);
+    let bucket = Bucket::on(store.clone(), "maps/city", "s3://test/maps/city").unwrap();
+    let found = findings(&bucket).unwrap();
+    for key in &keys {
+        let of_key = found.iter().filter(|finding| finding.contains(key.filename().unwrap())).count();
+        assert!(of_key > 0, "{key}: {found:?}");
+        let requests = store.requests(Kind::Get).iter().filter(|request| request.key == key.as_ref()).count();
+        assert!(requests < 16, "{key}: {requests} requests");
+    }
+    let of_segment = found.iter().filter(|finding| finding.contains(last.filename().unwrap())).count();
+    assert_eq!(of_segment, 12, "one for each scan");
+}
+
 /// Readers of an earlier push see its scans after the map was remapped and pushed, until a push prunes them. A snapshot
 /// retains its scans.
 #[test]
