@@ -19,7 +19,7 @@ trap 'rm -rf "$work"' EXIT
 python3 -m venv "$work/venv"
 python=$work/venv/bin/python
 install() { "$python" -m pip install --quiet --disable-pip-version-check "$@"; }
-install dask distributed matplotlib mypy pytest
+install dask distributed matplotlib 'moto[s3,server]' mypy pytest
 left_out=()
 if [[ $short ]]; then
     for file in dask dask_jobs dask_shards notebooks; do left_out+=("--ignore=tests/test_$file.py"); done

@@ -29,6 +29,7 @@ use voxtile::{
     ScanReport, SnapshotName, Stop, TileIndex, UnknownAs,
 };
 use voxtile_distance::MapDistances;
+use voxtile_pipeline::place::{check_is_folder, place_of};
 
 /// Up to this many queries, or points to insert, start on the calling thread and move to another one only if they take
 /// long.
@@ -235,7 +236,8 @@ impl Map {
     /// Opens a map to insert scans (mode "r+") or to query it (mode "r"). Readers may open a map that a writer has
     /// open.
     ///
-    /// A `snapshot` and a file of OctoMap (`.bt`, `.ot`) are read-only. A file of OctoMap is loaded into memory.
+    /// A `snapshot`, the URL of a map in a bucket and a file of OctoMap (`.bt`, `.ot`) are read-only. A file of OctoMap
+    /// is loaded into memory.
     #[staticmethod]
     #[pyo3(signature = (path, mode="r+", *, snapshot=None, memory=None))]
     fn open(
@@ -253,15 +255,19 @@ impl Map {
         match (mode, name) {
             ("r", Some(name)) => {
                 let snapshot = Some(name.to_string());
-                let found =
-                    Self::opened(py, path, move |path| options.open_snapshot(path, &name).map(reader))?;
+                let found = Self::opened(py, path, move |path| {
+                    options.open_snapshot(place_of(path)?, &name).map(reader)
+                })?;
                 Ok(Self { snapshot, ..found })
             }
             ("r", None) if is_octree => Self::opened(py, path, Source::octree),
-            ("r", None) => Self::opened(py, path, move |path| options.open_read_only(path).map(reader)),
-            ("r+", None) if !is_octree => {
-                Self::opened(py, path, move |path| Source::writer(options.open(path)?))
+            ("r", None) => {
+                Self::opened(py, path, move |path| options.open_read_only(place_of(path)?).map(reader))
             }
+            ("r+", None) if !is_octree => Self::opened(py, path, move |path| {
+                check_is_folder(path)?;
+                Source::writer(options.open(path)?)
+            }),
             ("r+", _) => {
                 Err(wrong(py, "mode", "snapshots and files of OctoMap are read-only; use mode=\"r\""))
             }

@@ -14,6 +14,7 @@ use voxtile::mapper::{MapReader, MapView, OctreeMap};
 use voxtile::operations::{self, AreaPart, CopyScans, Decay, MaxAge, Part, Prefer};
 use voxtile::space::Grid;
 use voxtile::{MapPath, MemoryLimit, Result, SnapshotName, Stop, TileIndex, integrity};
+use voxtile_pipeline::place::{check_is_folder, place_of};
 use voxtile_pipeline::{PolygonFile, check_is_no_file, octree_file};
 
 /// A map, or a tuple of a map and the name of a snapshot.
@@ -36,9 +37,9 @@ impl MapOrSnapshot {
 
     pub fn open(&self) -> Result<MapReader> {
         match self {
-            Self::Map(path) => MapReader::open(folder_of(path)?, MemoryLimit::DEFAULT_BYTES),
+            Self::Map(path) => MapReader::open(place_to_read(path)?, MemoryLimit::DEFAULT_BYTES),
             Self::Snapshot(path, name) => MapReader::open_snapshot(
-                folder_of(path)?,
+                place_to_read(path)?,
                 &SnapshotName::new(name)?,
                 MemoryLimit::DEFAULT_BYTES,
             ),
@@ -51,9 +52,14 @@ pub fn named_snapshot(map: &Path, name: &str) -> PathBuf {
     PathBuf::from(format!("{}@{name}", map.display()))
 }
 
-/// Returns the folder of a map, or an error for a file.
+/// Returns the folder of a map to change, or an error for a file and for a map in a bucket.
 pub fn folder_of(map: &Path) -> Result<&Path> {
-    check_is_no_file(map).map(|()| map)
+    check_is_no_file(map).and_then(|()| check_is_folder(map)).map(|()| map)
+}
+
+/// Returns the folder or the bucket of a map to read, or an error for a file.
+fn place_to_read(map: &Path) -> Result<MapPath> {
+    check_is_no_file(map).and_then(|()| place_of(map))
 }
 
 pub type Callback = Option<Py<PyAny>>;
@@ -79,7 +85,7 @@ fn part_of(region: &Bound<'_, PyAny>, outside: bool) -> PyResult<Part> {
 /// Lists the snapshots of a map, ordered by flush and then by name: a list of dicts.
 #[pyfunction]
 pub fn snapshots<'py>(py: Python<'py>, map: PathBuf) -> PyResult<Bound<'py, PyAny>> {
-    reported(py, None, |_, _| operations::snapshots(folder_of(&map)?))
+    reported(py, None, |_, _| operations::snapshots(place_to_read(&map)?))
 }
 
 /// Deletes a snapshot and frees the tiles that only this snapshot uses.
@@ -429,7 +435,7 @@ pub fn verify<'py>(
     let mut findings = Vec::new();
     let sums = reported(py, progress, |_, progress| {
         integrity::verify_scope(
-            folder_of(&map)?,
+            place_to_read(&map)?,
             &scope,
             |finding| findings.push(finding.clone()),
             |done, all| progress.report(done, all),

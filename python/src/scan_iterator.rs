@@ -18,6 +18,7 @@ use voxtile::scan::{MovingMarks, PointAttributes, ScanPoints};
 use voxtile::{Pose, Result as Fallible, Stop};
 use voxtile_formats::{ReadOptions, ScanReach, ScanSource, SensorScan};
 use voxtile_pipeline::Watch;
+use voxtile_pipeline::place::{is_map_at, place_of, url_of};
 
 /// A scan: points in the sensor's frame, the pose, and intensities.
 type ReadScan<'py> =
@@ -150,10 +151,10 @@ impl Input {
 
     fn open(&self) -> anyhow::Result<Scans> {
         let [path] = &self.paths[..] else { return Ok(Scans::Input(self.source()?)) };
-        if self.has_options || !is_map(path) {
+        if self.has_options || !is_map(path)? {
             return Ok(Scans::Input(self.source()?));
         }
-        let reader = MapReader::open(path, 0)?;
+        let reader = MapReader::open(place_of(path)?, 0)?;
         let count = reader.kept_summary()?.scans().len();
         Ok(Scans::Kept(Box::new(reader.kept_scans()?), count))
     }
@@ -224,6 +225,9 @@ pub fn count_scans(py: Python<'_>, path: Paths, options: &Bound<'_, PyDict>) -> 
     counted.map_err(|error| exception_of_any(py, &error))
 }
 
-fn is_map(path: &Path) -> bool {
-    path.join("metadata.json").is_file() && path.join("commits.log").is_file()
+fn is_map(path: &Path) -> Fallible<bool> {
+    match url_of(path) {
+        Some(url) => is_map_at(url, &Stop::default()),
+        None => Ok(path.join("metadata.json").is_file() && path.join("commits.log").is_file()),
+    }
 }

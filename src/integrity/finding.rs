@@ -2,6 +2,7 @@ use crate::error::{Error, FormatError, Place};
 use crate::space::TileIndex;
 use serde::Serialize;
 use std::fmt;
+use std::io;
 use std::path::{Path, PathBuf};
 
 /// Finding about the files of a map.
@@ -51,9 +52,11 @@ impl Finding {
         }
     }
 
-    /// Returns whether an error is specific to one file: it is not a regular file, or the medium failed.
+    /// Returns whether an error is specific to one file: it is not a regular file, the medium failed, or an object in a
+    /// bucket is lost or damaged.
     pub(super) fn is_of_file(error: &Error) -> bool {
-        matches!(error, Error::Io { cause, .. } if cause.kind() == std::io::ErrorKind::InvalidInput)
+        matches!(error, Error::Io { cause, .. }
+            if matches!(cause.kind(), io::ErrorKind::InvalidInput | io::ErrorKind::InvalidData))
             || error.is_of_medium()
     }
 
@@ -61,8 +64,12 @@ impl Finding {
     pub(super) fn of(error: Error) -> Result<Self, Error> {
         match error {
             Error::Damaged { path, tile, cause } => Ok(Self::damage(&path, tile, &cause)),
-            Error::Io { path, cause, .. } if cause.kind() == std::io::ErrorKind::InvalidInput => {
+            Error::Io { path, cause, .. } if cause.kind() == io::ErrorKind::InvalidInput => {
                 Ok(Self::damage(&path, None, &FormatError::at_offset(0, cause.to_string())))
+            }
+            Error::Io { path, cause, .. } if cause.kind() == io::ErrorKind::InvalidData => {
+                let finding = Self::damage(&path, None, &FormatError::at_offset(0, cause.to_string()));
+                Ok(Self { offset: None, ..finding })
             }
             error if error.is_of_medium() => Ok(Self::unreadable(&error, None)),
             error => Err(error),

@@ -1,5 +1,6 @@
 //! Checks the tables that only snapshots of a map use.
 
+use super::finding::Finding;
 use crate::config::MapConfig;
 use crate::error::{Error, Result};
 use crate::persistence::load;
@@ -36,7 +37,7 @@ pub(super) fn lost_tiles(
         }
         match load::load_table(&past, &config.grid, tile) {
             Ok(_) => drop(kept.map(|flush_number| whole.insert((tile, flush_number), version))),
-            Err(error) if matches!(error, Error::Damaged { .. }) || error.is_of_medium() => {
+            Err(error) if matches!(error, Error::Damaged { .. }) || Finding::is_of_file(&error) => {
                 lost.push((tile, error))
             }
             Err(error) => return Err(error),

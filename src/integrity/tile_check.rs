@@ -1,3 +1,4 @@
+use super::finding::Finding;
 use crate::config::MapConfig;
 use crate::error::{Error, FormatError, Result, is_of_medium};
 use crate::persistence::load::{self, ReadTable};
@@ -30,7 +31,7 @@ pub(super) fn check_tile(
             let path = store.layout().current(tile, TileFile::Table);
             Err(FormatError::at_offset(0, "the map does not contain this tile").in_map(&path, Some(tile)))
         }
-        Err(error) if matches!(error, Error::Damaged { .. }) || error.is_of_medium() => Err(error),
+        Err(error) if matches!(error, Error::Damaged { .. }) || Finding::is_of_file(&error) => Err(error),
         Err(error) => return Err(error),
     };
     let has_octree = store.layout().files().contains(&TileFile::Octree);
@@ -50,7 +51,9 @@ fn check_octree(
     let layout = store.layout();
     let current = layout.current(tile, TileFile::Octree);
     let found = match checksum_of(disk, &current) {
-        Err(Error::Io { action, cause, .. }) if is_of_medium(&cause) => {
+        Err(Error::Io { action, cause, .. })
+            if is_of_medium(&cause) || cause.kind() == io::ErrorKind::InvalidData =>
+        {
             let reason = format!("cannot {action}: {cause}; it can be derived from the table");
             return Ok(Err(FormatError::at_offset(0, reason)));
         }

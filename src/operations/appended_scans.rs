@@ -28,7 +28,7 @@ pub(super) fn append_scans(writer: &mut MapWriter, maps: &[MapReader]) -> Result
             let mut entry = entry.after(before);
             if let CatalogEntry::Kept(scan) = &mut entry {
                 for place in scan.places_mut() {
-                    *place = map.explained(archive.copy_from(map.store().layout(), *place))?;
+                    *place = map.explained(archive.copy_from(&*map.disk(), map.store().layout(), *place))?;
                 }
             }
             last = entry.numbers().map_or(last, |(_, last)| last);

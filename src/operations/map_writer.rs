@@ -112,8 +112,8 @@ impl MapWriter {
         Ok(())
     }
 
-    /// Copies the scans that another map on the same disk keeps, with their numbers, and the numbers of removed ones. Must
-    /// be called before tiles are added.
+    /// Copies the scans that another map keeps, with their numbers, and the numbers of removed ones. Must be called before
+    /// tiles are added.
     ///
     /// # Errors
     ///
@@ -124,7 +124,7 @@ impl MapWriter {
             let mut entry = map.explained(records.next_entry())?;
             if let Some(CatalogEntry::Kept(scan)) = &mut entry {
                 for place in scan.places_mut() {
-                    *place = map.explained(archive.copy_from(map.store().layout(), *place))?;
+                    *place = map.explained(archive.copy_from(&*map.disk(), map.store().layout(), *place))?;
                 }
             }
             Ok(entry)

@@ -59,8 +59,8 @@ pub use merge_rule::Prefer;
 pub use part::{AreaPart, Part};
 pub use remapping::{
     NewPoses, OnlineRemap, PointsRemoved, Rebuilt, Remap, RemapPart, Remapped, Replay, Replayed,
-    ScanSelection, ScansRemoved, ScansWithout, SnapshotFailure, join_remap, mark_moving, rebuild, remap,
-    remap_columns, remap_part, remove_points, remove_scans,
+    ScanSelection, ScansRemoved, ScansWithout, SnapshotFailure, join_remap, mark_moving, rebuild,
+    rebuild_with_poses, remap, remap_columns, remap_part, remove_points, remove_scans,
 };
 pub use replace_tiles::{TilesReplaced, replace_tiles};
 pub use revert::{Reverted, revert};

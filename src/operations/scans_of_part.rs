@@ -30,7 +30,8 @@ pub(super) fn keep_scans_of_part(writer: &mut MapWriter, map: &MapReader, part: 
                 (None, mut entry) => {
                     if let Some(CatalogEntry::Kept(scan)) = &mut entry {
                         for place in scan.places_mut() {
-                            *place = map.explained(archive.copy_from(map.store().layout(), *place))?;
+                            *place =
+                                map.explained(archive.copy_from(&*map.disk(), map.store().layout(), *place))?;
                         }
                     }
                     return Ok(entry);

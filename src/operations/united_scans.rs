@@ -36,7 +36,7 @@ pub(super) fn unite_scans(
                 scan.tiles.dedup();
                 let holder = &united.parts[united.holder];
                 for place in scan.places_mut() {
-                    *place = holder.explained(archive.copy_from(&holder.layout, *place))?;
+                    *place = holder.explained(archive.copy_from(&*holder.disk, &holder.layout, *place))?;
                 }
             }
             _ => {}

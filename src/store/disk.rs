@@ -12,7 +12,7 @@ use std::time::Duration;
 /// [`FsDisk`](super::FsDisk) implements it with the operating system. Tests use disks that fail, fill up or crash.
 pub trait Disk: Debug + Send + Sync {
     /// Opens a regular file for reading. Other kinds of files, including symbolic links, are an error of kind
-    /// `InvalidInput`.
+    /// `InvalidInput`. Content that is lost or damaged is an error of kind `InvalidData`, here or while it is read.
     fn open(&self, path: &Path) -> io::Result<Box<dyn DiskRead>>;
     /// Opens a file for reading, starting at `offset`.
     fn open_at(&self, path: &Path, offset: u64) -> io::Result<Box<dyn DiskRead>> {

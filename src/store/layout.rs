@@ -115,7 +115,7 @@ impl Layout {
     }
 
     /// Parses the number in a segment's name; `None` for another name.
-    pub(super) fn segment_of(name: &str) -> Option<u64> {
+    pub fn segment_of(name: &str) -> Option<u64> {
         number_behind(SEGMENT_PREFIX, name)
     }
 

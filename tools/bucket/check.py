@@ -21,12 +21,13 @@ TEMPORARY.mkdir()
 
 
 class Proxy(BaseHTTPRequestHandler):
-    """Forwards requests to the server `behind`; every third one suffers `fault`."""
+    """Forwards requests to the server `behind` and counts what it answers; every third one suffers `fault`."""
 
     protocol_version = "HTTP/1.1"
     behind = ("127.0.0.1", 0)
     fault = None
     requests = 0
+    bytes_answered = 0
     lock = threading.Lock()
 
     def handle_one(self):
@@ -47,6 +48,8 @@ class Proxy(BaseHTTPRequestHandler):
         connection.request(self.command, self.path, body, dict(self.headers))
         answer = connection.getresponse()
         content = answer.read()
+        with Proxy.lock:
+            Proxy.bytes_answered += len(content)
         self.send_response(answer.status)
         for name, value in answer.getheaders():
             if name.lower() not in ("connection", "transfer-encoding", "content-length"):
@@ -252,6 +255,8 @@ def check_scans(s3, port, bad):
     voxtile("build", "s3://robots/kept", "-o", WORK / "again", "--resolution", 0.5, port=port)
     assert voxtile("digest", WORK / "again", port=port) == digest
 
+    check_kept_scans(s3, port, bad)
+
     # A comparison reads maps and positions of kept scans from the bucket.
     compared = [
         json.loads(voxtile("compare", map, WORK / "one", "--json", port=port))
@@ -266,6 +271,58 @@ def check_scans(s3, port, bad):
     done = subprocess.run([VOXTILE, "info", "s3://robots/kept"], env=lacking, capture_output=True, text=True, timeout=300)
     assert done.returncode != 0 and "AWS_ACCESS_KEY_ID" in done.stderr, done.stderr
     print("scans in a bucket give the same map as scans in a folder")
+
+
+def check_kept_scans(s3, port, counting):
+    """Kept scans are read from the bucket `robots/kept`, a push of `of_folder`, without a copy of the archive."""
+    url, folder = "s3://robots/kept", WORK / "of_folder"
+    digests = [voxtile("digest", "--scans", map, port=port) for map in (folder, url)]
+    assert digests[0] == digests[1], digests
+    poses = WORK / "moved_kitti.txt"
+    poses.write_text("".join(f"1 0 0 {number} 0 1 0 {number / 10} 0 0 1 1\n" for number in range(20)))
+    segments = sum(file.stat().st_size for file in (folder / "kept_scans").iterdir())
+    Proxy.bytes_answered = 0
+    voxtile("remap", url, "--poses", poses, "-o", WORK / "remapped", "--keep-scans", port=counting)
+    # Manifest, log and metadata are small.
+    assert Proxy.bytes_answered < segments + 50_000, (Proxy.bytes_answered, segments)
+    output = voxtile("remap", url, "--poses", poses, port=port, fails=True)
+    assert "-o" in output and "voxtile pull" in output, output
+    voxtile("export", url, "--scans", WORK / "exported", port=port)
+    voxtile("build", WORK / "exported", "-o", WORK / "of_exported", "--resolution", 0.5, port=port)
+    assert voxtile("digest", WORK / "of_exported", port=port) == voxtile("digest", url, port=port)
+
+    # In place, in a copy: the same map. A push sends the new catalog, but no points.
+    shutil.copytree(folder, WORK / "copy")
+    voxtile("remap", WORK / "copy", "--poses", poses, port=port)
+    for what in ([], ["--scans"]):
+        copies = [voxtile("digest", *what, WORK / map, port=port) for map in ("copy", "remapped")]
+        assert copies[0] == copies[1], (what, copies)
+    pushed = json.loads(voxtile("push", WORK / "copy", url, "--json", "--prune", port=port))
+    tiles = sum(file.stat().st_size for file in (WORK / "copy").glob("tile_*/*"))
+    assert pushed["bytes_sent"] < tiles + 50_000 and pushed["objects_pruned"] > 0, pushed
+    assert voxtile("digest", "--scans", url, port=port) == voxtile("digest", "--scans", WORK / "copy", port=port)
+
+    # Lost and changed objects of scans are named, and sent again.
+    manifest = json.loads(s3.get_object(Bucket="robots", Key="kept/manifest.json")["Body"].read())
+    for path, file in manifest["files"].items():
+        if not path.startswith("kept_scans/"):
+            continue
+        name = file["parts"][0]
+        for content in (b"other", None):
+            if content is None:
+                s3.delete_object(Bucket="robots", Key=f"kept/objects/{name}")
+            else:
+                s3.put_object(Bucket="robots", Key=f"kept/objects/{name}", Body=content)
+            for command in (["digest", "--scans", url], ["verify", url], ["remap", url, "-o", WORK / "lost"]):
+                output = voxtile(*command, port=port, fails=True)
+                assert name in output and "push --resend" in output, (command, output)
+            voxtile("push", WORK / "copy", url, "--resend", port=port)
+            assert "intact" in voxtile("verify", url, port=port)
+    # The first state again, for the next checks.
+    voxtile("remap", WORK / "copy", "--poses", WORK / "web" / "drive" / "poses_kitti.txt", port=port)
+    voxtile("push", WORK / "copy", url, port=port)
+    assert voxtile("digest", url, port=port) == voxtile("digest", folder, port=port)
+    print("kept scans are read from the bucket, and new poses make a new map")
 
 
 main()

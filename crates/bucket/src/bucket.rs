@@ -77,8 +77,8 @@ impl Bucket {
     /// Default [timeout](Bucket::with_timeout) of a request without progress.
     pub const DEFAULT_TIMEOUT: Duration = Duration::from_secs(60);
 
-    /// Opens the bucket and prefix of a URL: `s3://BUCKET/MAP`, `gs://BUCKET/MAP`, `az://CONTAINER/MAP`, or
-    /// `https://HOST/MAP`, which is read-only. Keys, region and endpoint are read from the environment variables of
+    /// Opens the bucket and prefix of a URL: `s3://BUCKET/MAP`, `gs://BUCKET/MAP`, `az://CONTAINER/MAP`
+    /// (or `abfs`, `abfss`), or `https://HOST/MAP` (or `http`), which is read-only. Keys, region and endpoint are read from the environment variables of
     /// each store's own tools: `AWS_ACCESS_KEY_ID`, `AWS_REGION`, `AWS_ENDPOINT_URL`, `GOOGLE_SERVICE_ACCOUNT`,
     /// `AZURE_STORAGE_ACCOUNT_NAME` and so on. `VOXTILE_BUCKET_TIMEOUT` is the [timeout](Bucket::with_timeout) in
     /// seconds.
@@ -480,7 +480,7 @@ pub(super) fn object_error(key: &Key, error: &object_store::Error) -> io::Error 
     io::Error::new(kind, format!("object {key}: {}", error_text(error)))
 }
 
-/// Replaces a `NotFound` error by one of another kind: the object is missing, but the map has the file.
+/// Replaces a `NotFound` error by damage: the object is missing, but the map has the file.
 pub(super) fn missing_object(error: io::Error) -> io::Error {
     if error.kind() != io::ErrorKind::NotFound {
         return error;
@@ -488,7 +488,7 @@ pub(super) fn missing_object(error: io::Error) -> io::Error {
     let reason = format!(
         "{error}; if another push used --prune, open the map again; otherwise {RESEND_HINT} from its folder"
     );
-    io::Error::other(reason)
+    io::Error::new(io::ErrorKind::InvalidData, reason)
 }
 
 /// Returns an error with its causes, on one line.

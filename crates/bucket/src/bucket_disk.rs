@@ -1,19 +1,18 @@
 use super::bucket::{Bucket, missing_object};
 use super::file_list::FileList;
 use super::manifest::{PART_BYTES, StoredFile};
+use super::part_cache::PartCache;
 use super::part_reader::PartReader;
-use super::pending::Pending;
-use bytes::Bytes;
-use lru::LruCache;
 use object_store::UpdateVersion;
 use std::io;
 use std::path::{Path, PathBuf};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::Arc;
 use voxtile::scratch::Scratch;
-use voxtile::store::{Disk, DiskLock, DiskRead, DiskWrite, EntryKind, MapPath, ReaderWatch};
+use voxtile::store::{Disk, DiskLock, DiskRead, DiskWrite, EntryKind, FsDisk, MapPath, ReaderWatch};
 use voxtile::{Error, Result};
 
-/// A map in a bucket as a read-only disk. It shows the last push at the time it was opened.
+/// A map in a bucket as a disk. The map is read-only, and is that of the last push at the time it was opened. All other
+/// paths are files of this machine, so that an operation can write a new map.
 ///
 /// While a reader visits tiles, the next tiles are prefetched, several at a time.
 #[derive(Debug)]
@@ -24,19 +23,15 @@ pub struct BucketDisk {
     list: FileList,
     /// Version of the manifest.
     version: UpdateVersion,
-    ahead: Mutex<Ahead>,
+    parts: Arc<PartCache>,
 }
 
-/// Files that were requested but not opened yet.
-#[derive(Debug)]
-struct Ahead {
-    files: LruCache<String, (u64, Pending<Bytes>)>,
-    bytes: u64,
-}
-
-/// Number of files that a reader prefetches, and maximum size of all prefetched files in bytes.
+/// Number of files that a reader prefetches.
 const FILES_AHEAD: usize = 16;
-const BYTES_AHEAD: u64 = 2 * PART_BYTES;
+
+/// Maximum size of prefetched files, and of parts that several readers use, in bytes: the current and the next part of
+/// points and of their marks.
+const CACHED_BYTES: u64 = 4 * PART_BYTES;
 
 impl BucketDisk {
     /// Opens the map in a bucket, and reads its manifest.
@@ -49,9 +44,9 @@ impl BucketDisk {
         Ok(Self {
             root: bucket.path().to_owned(),
             list: FileList::new(bucket.clone(), found.manifest),
+            parts: Arc::new(PartCache::new(bucket.clone(), CACHED_BYTES)),
             bucket,
             version: found.version,
-            ahead: Mutex::new(Ahead { files: LruCache::unbounded(), bytes: 0 }),
         })
     }
 
@@ -61,54 +56,35 @@ impl BucketDisk {
         MapPath::on(Arc::new(self), root)
     }
 
-    /// Returns the path of a file inside the map, with `/` between names; `None` if the path is outside the map.
+    /// Returns the path of a file inside the map, with `/` between names; `None` for a file of this machine.
     fn path_in_map(&self, path: &Path) -> Option<String> {
         let names = path.strip_prefix(&self.root).ok()?.iter();
-        names.map(|name| name.to_str()).collect::<Option<Vec<_>>>().map(|names| names.join("/"))
+        Some(names.map(|name| name.to_string_lossy()).collect::<Vec<_>>().join("/"))
+    }
+
+    /// Returns the disk of this machine to change a file.
+    ///
+    /// # Errors
+    ///
+    /// A path inside the map.
+    fn writable(&self, path: &Path) -> io::Result<FsDisk> {
+        match path.starts_with(&self.root) {
+            false => Ok(FsDisk),
+            true => {
+                let reason =
+                    "a map in a bucket is read-only; `voxtile pull` it, change it, `voxtile push` it";
+                Err(io::Error::new(io::ErrorKind::ReadOnlyFilesystem, reason))
+            }
+        }
     }
 
     fn open_from(&self, path: &Path, offset: u64) -> io::Result<Box<dyn DiskRead>> {
-        let name = self.path_in_map(path).ok_or(io::ErrorKind::NotFound)?;
+        let Some(name) = self.path_in_map(path) else { return FsDisk.open_at(path, offset) };
         let file: StoredFile = self.list.file(&name)?.ok_or(io::ErrorKind::NotFound)?;
-        let first = if offset == 0 { self.ahead().take(&name) } else { None };
-        Ok(Box::new(PartReader::new(self.bucket.clone(), file, offset, first)?))
+        // The scans of a segment are opened one by one, and a catalog several times. A tile is read once.
+        let keeps = self.list.is_own(&name);
+        Ok(Box::new(PartReader::new(self.parts.clone(), file, offset, keeps)?))
     }
-
-    fn ahead(&self) -> MutexGuard<'_, Ahead> {
-        self.ahead.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-}
-
-impl Ahead {
-    fn take(&mut self, name: &str) -> Option<Pending<Bytes>> {
-        let (bytes, pending) = self.files.pop(name)?;
-        self.bytes -= bytes;
-        Some(pending)
-    }
-
-    /// Requests a file, unless another thread has already requested it.
-    fn request(&mut self, name: String, bytes: u64, fetch: impl FnOnce() -> Pending<Bytes>) {
-        if self.files.contains(&name) {
-            return;
-        }
-        self.free_space(bytes);
-        self.files.put(name, (bytes, fetch()));
-        self.bytes += bytes;
-    }
-
-    /// Frees space for a file: drops the oldest requests that no reader has used.
-    fn free_space(&mut self, bytes: u64) {
-        while (self.files.len() >= 2 * FILES_AHEAD || self.bytes + bytes > BYTES_AHEAD)
-            && let Some((_, (dropped, _))) = self.files.pop_lru()
-        {
-            self.bytes -= dropped;
-        }
-    }
-}
-
-fn read_only<T>() -> io::Result<T> {
-    let reason = "a map in a bucket is read-only; `voxtile pull` it, change it, `voxtile push` it";
-    Err(io::Error::new(io::ErrorKind::ReadOnlyFilesystem, reason))
 }
 
 impl Disk for BucketDisk {
@@ -121,7 +97,7 @@ impl Disk for BucketDisk {
     }
 
     fn read_at(&self, path: &Path, offset: u64, bytes: usize) -> io::Result<Vec<u8>> {
-        let name = self.path_in_map(path).ok_or(io::ErrorKind::NotFound)?;
+        let Some(name) = self.path_in_map(path) else { return FsDisk.read_at(path, offset, bytes) };
         let file = self.list.file(&name)?.ok_or(io::ErrorKind::NotFound)?;
         let end = offset.saturating_add(bytes as u64).min(file.bytes);
         let (mut read, mut at) = (Vec::new(), offset);
@@ -142,11 +118,14 @@ impl Disk for BucketDisk {
     }
 
     fn open_shared(&self, path: &Path) -> io::Result<Box<dyn DiskRead>> {
-        self.open_from(path, 0)
+        match self.path_in_map(path) {
+            Some(_) => self.open_from(path, 0),
+            None => FsDisk.open_shared(path),
+        }
     }
 
     fn kind(&self, path: &Path) -> io::Result<Option<EntryKind>> {
-        let Some(name) = self.path_in_map(path) else { return Ok(None) };
+        let Some(name) = self.path_in_map(path) else { return FsDisk.kind(path) };
         if let Some(file) = self.list.file(&name)? {
             return Ok(Some(EntryKind::File(file.bytes)));
         }
@@ -155,7 +134,7 @@ impl Disk for BucketDisk {
     }
 
     fn list(&self, path: &Path) -> io::Result<Vec<String>> {
-        let name = self.path_in_map(path).ok_or(io::ErrorKind::NotFound)?;
+        let Some(name) = self.path_in_map(path) else { return FsDisk.list(path) };
         let names = self.list.names_in(&name)?;
         if names.is_empty() {
             return Err(io::ErrorKind::NotFound.into());
@@ -175,76 +154,72 @@ impl Disk for BucketDisk {
 
     fn read_ahead(&self, path: &Path) {
         let Some(name) = self.path_in_map(path) else { return };
-        if self.ahead().files.contains(&name) {
-            return;
-        }
         let Ok(Some(file)) = self.list.file(&name) else { return };
         let &[part] = &file.parts[..] else { return };
-        self.ahead().request(name, file.bytes, || self.bucket.fetch(part, PART_BYTES));
+        self.parts.request(part, file.bytes);
     }
 
-    fn watch(&self, _: &Path) -> io::Result<Box<dyn ReaderWatch>> {
-        read_only()
-    }
-
-    fn create(&self, _: &Path) -> io::Result<Box<dyn DiskWrite>> {
-        read_only()
-    }
-
-    fn append(&self, _: &Path, _: u64) -> io::Result<Box<dyn DiskWrite>> {
-        read_only()
-    }
-
-    fn sync_file(&self, _: &Path) -> io::Result<()> {
-        read_only()
-    }
-
-    fn sync_folder(&self, _: &Path) -> io::Result<()> {
-        read_only()
-    }
-
-    fn rename(&self, _: &Path, _: &Path) -> io::Result<()> {
-        read_only()
-    }
-
-    fn remove_file(&self, _: &Path) -> io::Result<()> {
-        read_only()
-    }
-
-    fn create_folder(&self, _: &Path) -> io::Result<()> {
-        read_only()
-    }
-
-    fn remove_folder(&self, _: &Path) -> io::Result<()> {
-        read_only()
-    }
-
-    fn scratch(&self, _: &Path) -> io::Result<Box<dyn Scratch>> {
-        read_only()
-    }
-
-    fn lock(&self, _: &Path) -> io::Result<Option<Box<dyn DiskLock>>> {
-        read_only()
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::object_name::ObjectName;
-    use object_store::memory::InMemory;
-
-    #[test]
-    fn a_file_that_two_threads_request_is_counted_once() {
-        let bucket = Bucket::on(Arc::new(InMemory::new()), "map", "s3://test/map").unwrap();
-        let mut ahead = Ahead { files: LruCache::unbounded(), bytes: 0 };
-        for name in ["a", "b", "a"] {
-            ahead.request(name.to_owned(), 10, || bucket.fetch(ObjectName::of(b""), 10));
+    fn resolve(&self, path: &Path) -> io::Result<PathBuf> {
+        match self.path_in_map(path) {
+            Some(_) => Ok(path.to_owned()),
+            None => FsDisk.resolve(path),
         }
-        assert_eq!((ahead.files.len(), ahead.bytes), (2, 20));
-        for name in ["a", "b"] {
-            assert!(ahead.take(name).is_some());
-        }
-        assert_eq!(ahead.bytes, 0);
+    }
+
+    fn watch(&self, path: &Path) -> io::Result<Box<dyn ReaderWatch>> {
+        self.writable(path)?.watch(path)
+    }
+
+    fn create(&self, path: &Path) -> io::Result<Box<dyn DiskWrite>> {
+        self.writable(path)?.create(path)
+    }
+
+    fn append(&self, path: &Path, offset: u64) -> io::Result<Box<dyn DiskWrite>> {
+        self.writable(path)?.append(path, offset)
+    }
+
+    fn sync_file(&self, path: &Path) -> io::Result<()> {
+        self.writable(path)?.sync_file(path)
+    }
+
+    fn sync_folder(&self, path: &Path) -> io::Result<()> {
+        self.writable(path)?.sync_folder(path)
+    }
+
+    fn sync_all(&self, files: &[PathBuf], folders: &[PathBuf]) -> [Vec<io::Result<()>>; 2] {
+        // Only files of this machine are written.
+        FsDisk.sync_all(files, folders)
+    }
+
+    fn rename(&self, from: &Path, to: &Path) -> io::Result<()> {
+        self.writable(from).and(self.writable(to))?.rename(from, to)
+    }
+
+    fn exchange(&self, first: &Path, second: &Path) -> io::Result<()> {
+        self.writable(first).and(self.writable(second))?.exchange(first, second)
+    }
+
+    fn link(&self, from: &Path, to: &Path) -> io::Result<()> {
+        self.writable(from).and(self.writable(to))?.link(from, to)
+    }
+
+    fn remove_file(&self, path: &Path) -> io::Result<()> {
+        self.writable(path)?.remove_file(path)
+    }
+
+    fn create_folder(&self, path: &Path) -> io::Result<()> {
+        self.writable(path)?.create_folder(path)
+    }
+
+    fn remove_folder(&self, path: &Path) -> io::Result<()> {
+        self.writable(path)?.remove_folder(path)
+    }
+
+    fn scratch(&self, folder: &Path) -> io::Result<Box<dyn Scratch>> {
+        self.writable(folder)?.scratch(folder)
+    }
+
+    fn lock(&self, path: &Path) -> io::Result<Option<Box<dyn DiskLock>>> {
+        self.writable(path)?.lock(path)
     }
 }

@@ -73,6 +73,11 @@ impl FileList {
         &self.files
     }
 
+    /// Returns whether a path is of a file that belongs to no tile.
+    pub(super) fn is_own(&self, path: &str) -> bool {
+        self.files.contains_key(path)
+    }
+
     fn page_of(&self, tile: TileIndex) -> io::Result<Option<Arc<Files>>> {
         self.page(&Manifest::page_of(tile))
     }

@@ -17,8 +17,9 @@
 //! | `object_name` | names of objects: the BLAKE3 of their content |
 //! | `manifest` | the only object that changes: the files of the map, and the pages of tile files |
 //! | `file_list` | the list of files, with a cache of pages |
-//! | `bucket_disk`, `part_reader` | a map in a bucket as a read-only disk |
+//! | `bucket_disk`, `part_reader`, `part_cache` | a map in a bucket as a read-only disk |
 //! | `fetched_files`, `file_fetch` | downloads of scans and other files |
+//! | `known_parts` | parts of kept scans that a push need not read |
 //! | `known_states` | the states of a map that were pushed from its folder or pulled into it |
 //! | `push`, `sender`, `prune`, `pull` | transfer of maps to buckets and back |
 //!
@@ -31,9 +32,11 @@ mod counting_client;
 mod fetched_files;
 mod file_fetch;
 mod file_list;
+mod known_parts;
 mod known_states;
 mod manifest;
 mod object_name;
+mod part_cache;
 mod part_reader;
 mod pending;
 mod prune;

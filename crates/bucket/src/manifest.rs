@@ -128,6 +128,11 @@ pub(super) fn page_from_bytes(name: &str, bytes: &[u8]) -> Result<Files, String>
 }
 
 impl StoredFile {
+    /// Returns the size in bytes of the part with this number, from 0.
+    pub(super) fn bytes_of_part(&self, number: usize) -> u64 {
+        self.bytes.saturating_sub((number as u64).saturating_mul(PART_BYTES)).min(PART_BYTES)
+    }
+
     /// Returns whether this is the given version of a tile's file.
     pub(super) fn is_version(&self, version: FileVersion) -> bool {
         self.bytes == version.checksum.bytes

@@ -1,35 +1,30 @@
-use super::bucket::{Bucket, missing_object};
+use super::bucket::missing_object;
 use super::manifest::{PART_BYTES, StoredFile};
-use super::pending::Pending;
+use super::object_name::ObjectName;
+use super::part_cache::PartCache;
 use bytes::{Buf, Bytes};
 use std::io::{self, Read};
+use std::sync::Arc;
 use voxtile::store::DiskRead;
 
 /// Reader of a file in a bucket, part by part. While a part is read, the next part is fetched.
 pub(super) struct PartReader {
-    bucket: Bucket,
+    parts: Arc<PartCache>,
+    /// Whether other readers may need the same parts.
+    keeps: bool,
     file: StoredFile,
-    /// Number of the next part to request.
+    /// Number of the next part.
     next: usize,
-    pending: Option<Pending<Bytes>>,
     /// Rest of the current part.
     part: Bytes,
 }
 
 impl PartReader {
-    /// Starts at an offset. `first` is the pending request for the first part, if it was already sent.
-    pub(super) fn new(
-        bucket: Bucket,
-        file: StoredFile,
-        offset: u64,
-        first: Option<Pending<Bytes>>,
-    ) -> io::Result<Self> {
+    /// Starts at an offset.
+    pub(super) fn new(parts: Arc<PartCache>, file: StoredFile, offset: u64, keeps: bool) -> io::Result<Self> {
         let next = usize::try_from(offset / PART_BYTES).unwrap_or(usize::MAX);
-        let mut reader = Self { bucket, file, next, pending: None, part: Bytes::new() };
-        match first {
-            Some(first) => (reader.pending, reader.next) = (Some(first), next.saturating_add(1)),
-            None => reader.request_next(),
-        }
+        let mut reader = Self { parts, keeps, file, next, part: Bytes::new() };
+        reader.request_next();
         let mut before = offset % PART_BYTES;
         while before > 0 && reader.take_part()? {
             let passed = before.min(reader.part.len() as u64);
@@ -39,23 +34,26 @@ impl PartReader {
         Ok(reader)
     }
 
-    /// Requests the next part, if there is one.
-    fn request_next(&mut self) {
-        let name = self.file.parts.get(self.next).copied();
-        self.pending = name.map(|name| self.bucket.fetch(name, PART_BYTES));
-        self.next = self.next.saturating_add(1);
+    /// Returns the next part and its size in bytes, if there is one.
+    fn next_part(&self) -> Option<(ObjectName, u64)> {
+        self.file.parts.get(self.next).map(|name| (*name, self.file.bytes_of_part(self.next)))
     }
 
-    /// Waits for the requested part. Returns `false` at the end of the file.
+    fn request_next(&self) {
+        if let Some((name, bytes)) = self.next_part() {
+            self.parts.request(name, bytes);
+        }
+    }
+
+    /// Waits for the next part. Returns `false` at the end of the file.
     fn take_part(&mut self) -> io::Result<bool> {
-        let (number, Some(pending)) = (self.next - 1, self.pending.take()) else { return Ok(false) };
-        self.part = pending.wait().map_err(missing_object)?;
-        let wanted = (self.file.bytes - number as u64 * PART_BYTES).min(PART_BYTES);
+        let Some((name, wanted)) = self.next_part() else { return Ok(false) };
+        self.part = self.parts.get(name, self.keeps).map_err(missing_object)?;
         if self.part.len() as u64 != wanted {
-            let (found, name) = (self.part.len(), self.file.parts.get(number).map(|name| name.key()));
-            let reason = format!("object {}: {found} bytes instead of {wanted}", name.unwrap_or_default());
+            let reason = format!("object {}: {} bytes instead of {wanted}", name.key(), self.part.len());
             return Err(io::Error::new(io::ErrorKind::InvalidData, reason));
         }
+        self.next += 1;
         self.request_next();
         Ok(true)
     }

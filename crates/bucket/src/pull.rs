@@ -3,13 +3,13 @@ use super::file_list::FileList;
 use super::known_states::{BUCKET_STATES, BUCKET_STATES_NEXT, KnownStates};
 use super::manifest::{Manifest, PART_BYTES, StoredFile};
 use super::object_name::ObjectName;
+use super::part_cache::PartCache;
 use super::part_reader::PartReader;
-use super::pending::Pending;
-use bytes::Bytes;
 use serde::Serialize;
 use std::collections::{BTreeSet, VecDeque};
 use std::io::{self, Read, Write};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use voxtile::store::{
     Disk, DiskRead, EntryKind, FileChecksum, FsDisk, KEPT_SCANS, Layout, MapPath, SNAPSHOTS, TileFile,
     TileStore, WriterLock, hex, staging_folder, tile_of_folder,
@@ -35,6 +35,9 @@ pub struct Pulled {
 
 /// Maximum number of files whose first part is requested before they are written.
 const MAX_IN_FLIGHT: usize = 8;
+
+/// Maximum size of their parts, of the file that is begun, and of the next part of the file that is written.
+const BYTES_IN_FLIGHT: u64 = (MAX_IN_FLIGHT as u64 + 2) * PART_BYTES;
 
 /// Downloads a map from a bucket into a folder. The map is assembled in `MAP.unfinished` and renamed at the end. A
 /// later pull reuses the files of an interrupted one. `progress` receives the bytes done and the bytes of all files.
@@ -71,6 +74,7 @@ pub fn pull(
         disk,
         folder: &unfinished,
         earlier,
+        parts: Arc::new(PartCache::new(bucket.clone(), BYTES_IN_FLIGHT)),
         in_flight: VecDeque::new(),
         pulled,
         progress,
@@ -137,10 +141,14 @@ impl Earlier {
         Ok(Some(Self { store, known: known.unwrap_or_default(), _lock: lock }))
     }
 
-    /// Returns the path of a file that is unchanged according to the log.
+    /// Returns the path of a file that may be unchanged: a file of a tile that is unchanged according to the log, or a
+    /// file of kept scans, for which the log has no checksum.
     fn unchanged_file(&self, path: &str, file: &StoredFile) -> Option<PathBuf> {
         let place = self.store.folder().join(path);
         let (folder, name) = path.split_once('/')?;
+        if folder == KEPT_SCANS {
+            return Some(place);
+        }
         let version = self.store.tiles().version(tile_of_folder(folder)?)?;
         let of_tile = self
             .store
@@ -194,11 +202,19 @@ struct Pull<'a, P> {
     disk: FsDisk,
     folder: &'a Path,
     earlier: Option<Earlier>,
-    /// Files to write, in order.
-    in_flight: VecDeque<(PathBuf, StoredFile, Option<Pending<Bytes>>)>,
+    parts: Arc<PartCache>,
+    in_flight: VecDeque<FileInFlight>,
     pulled: Pulled,
     progress: P,
     all_bytes: u64,
+}
+
+/// A file to write.
+struct FileInFlight {
+    place: PathBuf,
+    file: StoredFile,
+    /// Number of parts that are written already.
+    written: usize,
 }
 
 impl<P: FnMut(u64, u64)> Pull<'_, P> {
@@ -272,6 +288,7 @@ impl<P: FnMut(u64, u64)> Pull<'_, P> {
         if self.has_content(place, file)? {
             return Ok(());
         }
+        let mut written = 0;
         if let Some(earlier) = self.earlier.as_ref().and_then(|earlier| earlier.unchanged_file(path, file)) {
             let _ = self.disk.remove_file(place);
             // The log does not show whether the file was damaged later.
@@ -282,21 +299,52 @@ impl<P: FnMut(u64, u64)> Pull<'_, P> {
             {
                 return Ok(());
             }
+            written = self.copy_leading_parts(&earlier, place, file)?;
         }
-        let first = file.parts.first().map(|first| self.bucket.fetch(*first, PART_BYTES));
-        self.in_flight.push_back((place.to_owned(), file.clone(), first));
+        if let Some(first) = file.parts.get(written) {
+            self.parts.request(*first, file.bytes_of_part(written));
+        }
+        self.in_flight.push_back(FileInFlight { place: place.to_owned(), file: file.clone(), written });
         Ok(())
     }
 
     /// Writes the file that was requested first.
     fn finish_file(&mut self) -> Result<()> {
-        let Some((place, file, first)) = self.in_flight.pop_front() else { return Ok(()) };
+        let Some(FileInFlight { place, file, written }) = self.in_flight.pop_front() else { return Ok(()) };
+        let offset = written as u64 * PART_BYTES;
         self.pulled.files_fetched += 1;
-        self.pulled.bytes_fetched += file.bytes;
+        self.pulled.bytes_fetched += file.bytes - offset;
         let failed = |error| Error::io(&place, "fetch", error);
-        let mut input = PartReader::new(self.bucket.clone(), file, 0, first).map_err(failed)?;
-        let mut out = self.disk.create(&place).map_err(failed)?;
+        let mut input = PartReader::new(self.parts.clone(), file, offset, false).map_err(failed)?;
+        let out = if written > 0 { self.disk.append(&place, offset) } else { self.disk.create(&place) };
+        let mut out = out.map_err(failed)?;
         io::copy(&mut input, &mut out).and_then(|_| out.flush()).map_err(failed)
+    }
+
+    /// Copies the leading parts of a file from its earlier state, as far as they are whole and equal: a segment of kept
+    /// scans grows at its end. Returns their number.
+    fn copy_leading_parts(&self, earlier: &Path, place: &Path, file: &StoredFile) -> Result<usize> {
+        let Some(EntryKind::File(bytes)) = self.kind(earlier)? else { return Ok(0) };
+        let whole = (bytes / PART_BYTES) as usize;
+        let Ok(mut input) = self.disk.open(earlier) else { return Ok(0) };
+        let mut out = None;
+        for (written, name) in file.parts.iter().take(whole).enumerate() {
+            let mut part = Vec::new();
+            let read = input.by_ref().take(PART_BYTES).read_to_end(&mut part);
+            if read.is_err() || ObjectName::of(&part) != *name {
+                return Ok(written);
+            }
+            let out = match &mut out {
+                Some(out) => out,
+                None => {
+                    out.insert(self.disk.create(place).map_err(|error| Error::io(place, "create", error))?)
+                }
+            };
+            out.write_all(&part)
+                .and_then(|()| out.flush())
+                .map_err(|error| Error::io(place, "write", error))?;
+        }
+        Ok(whole.min(file.parts.len()))
     }
 
     /// Returns whether a file exists with the right content, as fetched by an interrupted pull.

@@ -1,7 +1,8 @@
 use super::bucket::Bucket;
 use super::file_list::FileList;
+use super::known_parts::KnownParts;
 use super::known_states::KnownStates;
-use super::manifest::{Files, Manifest, StoredFile, page_from_bytes};
+use super::manifest::{Files, Manifest, PART_BYTES, StoredFile, page_from_bytes};
 use super::object_name::ObjectName;
 use super::prune::prune;
 use super::sender::Sender;
@@ -112,6 +113,7 @@ struct Push<'a> {
     replaces: bool,
     /// Files of that manifest; `None` if everything is uploaded again.
     list: Option<FileList>,
+    known_parts: KnownParts,
     sender: Sender<'a>,
     /// Tile files uploaded by an earlier attempt.
     sent: FxHashMap<String, StoredFile>,
@@ -133,7 +135,8 @@ impl<'a> Push<'a> {
         sender.add_existing(list.iter().flat_map(|list| list.own_files().values()));
         let sent = FxHashMap::default();
         let replaces = options.replaces;
-        Ok(Self { bucket, before, version, known, replaces, list, sender, sent })
+        let known_parts = KnownParts::default();
+        Ok(Self { bucket, before, version, known, replaces, list, known_parts, sender, sent })
     }
 
     /// Uploads the missing objects of the map's last flush. Returns the manifest of this flush.
@@ -163,6 +166,7 @@ impl<'a> Push<'a> {
         }
         self.sender.set_tile(None);
         let files = store.committed_files(&snapshots).map_err(|error| kept_scans_error(&store, error))?;
+        self.known_parts = self.known_parts_of(&files)?;
         for file in files {
             let path = file.path.clone();
             let stored = self.send_file(&store, file, None)?;
@@ -221,6 +225,18 @@ impl<'a> Push<'a> {
     fn builds_on(&self, before: &Manifest) -> Result<bool> {
         let Some(known) = &self.known else { return Ok(true) };
         Ok(self.replaces || known.contains(self.name_of(before)?))
+    }
+
+    /// Returns the parts of kept scans that the bucket has. Without a record that the folder builds on the state in the
+    /// bucket, all files are read.
+    fn known_parts_of(&self, files: &[CommittedFile]) -> Result<KnownParts> {
+        let (Some(list), Some(before), Some(known)) = (&self.list, &self.before, &self.known) else {
+            return Ok(KnownParts::default());
+        };
+        match known.contains(self.name_of(before)?) {
+            true => Ok(KnownParts::new(list.own_files(), files)),
+            false => Ok(KnownParts::default()),
+        }
     }
 
     fn diverged_error(&self, before: &Manifest, folder: &Path) -> Error {
@@ -321,18 +337,19 @@ impl<'a> Push<'a> {
         let CommittedFile { path, content } = file;
         let (places, version) = match content {
             CommittedContent::Bytes(bytes) => {
-                return self.sender.send_file(&store.folder().join(path), &mut &bytes[..]);
+                return self.sender.send_file(&store.folder().join(path), Vec::new(), &mut &bytes[..]);
             }
             CommittedContent::Stored { places, version } => (places, version),
         };
         for place in places {
-            let input = match store.disk().open(&place) {
+            let leading = self.known_parts.of(&**store.disk(), &path, &place);
+            let input = match store.disk().open_at(&place, leading.len() as u64 * PART_BYTES) {
                 Ok(input) => input,
                 Err(error) if error.kind() == io::ErrorKind::NotFound => continue,
                 Err(error) => return Err(Error::io(&place, "open", error)),
             };
             let mut input = Checksumming::new(input);
-            let mut stored = self.sender.send_file(&place, &mut input)?;
+            let mut stored = self.sender.send_file(&place, leading, &mut input)?;
             let Some(FileVersion { checksum, scan_number }) = version else { return Ok(stored) };
             if input.finish().0 == checksum {
                 (stored.crc32, stored.scan_number) = (Some(checksum.crc), Some(scan_number));

@@ -110,4 +110,15 @@ mod tests {
         }
         assert!(remote_store("http://host/map", "http", "http://host").unwrap().is_some());
     }
+
+    /// Spark and Hadoop name the account in the URL.
+    #[test]
+    fn an_azure_url_may_name_its_account() {
+        let store = remote_store(
+            "abfss://robots@fleet.dfs.core.windows.net/map",
+            "abfss",
+            "abfss://robots@fleet.dfs.core.windows.net",
+        );
+        assert!(store.unwrap().unwrap().to_string().contains("fleet"));
+    }
 }

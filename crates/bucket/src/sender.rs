@@ -75,9 +75,16 @@ impl<'a> Sender<'a> {
         self.known.extend(files.flat_map(|file| &file.parts));
     }
 
-    /// Uploads the missing parts of a file. A read error names `path`.
-    pub(super) fn send_file(&mut self, path: &Path, input: &mut impl Read) -> Result<StoredFile> {
-        let mut file = StoredFile { bytes: 0, crc32: None, scan_number: None, parts: Vec::new() };
+    /// Uploads the missing parts of a file. `input` begins after the leading parts, which the bucket has. A read error
+    /// names `path`.
+    pub(super) fn send_file(
+        &mut self,
+        path: &Path,
+        leading: Vec<ObjectName>,
+        input: &mut impl Read,
+    ) -> Result<StoredFile> {
+        let bytes = leading.len() as u64 * PART_BYTES;
+        let mut file = StoredFile { bytes, crc32: None, scan_number: None, parts: leading };
         loop {
             let mut part = Vec::new();
             let read = input.by_ref().take(PART_BYTES).read_to_end(&mut part);

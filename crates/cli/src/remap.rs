@@ -12,12 +12,13 @@ use std::path::Path;
 use std::process::ExitCode;
 use std::time::Instant;
 use voxtile::mapper::{KeptSummary, MapReader, MapView};
-use voxtile::operations::{Remap, Remapped, rebuild, remap};
+use voxtile::operations::{NewPoses, Remap, Remapped, rebuild_with_poses, remap};
 use voxtile::sensor::{Iwlo, SensorModel};
 use voxtile::{Error, InsertMode, MapConfig, MemoryLimit, RayConfig};
 use voxtile_formats::Budget;
 use voxtile_pipeline::memory;
 use voxtile_pipeline::numbers::{Mount, tolerance_ns};
+use voxtile_pipeline::place::url_of;
 use voxtile_pipeline::{PoseFile, poses_for};
 
 #[derive(Serialize)]
@@ -33,7 +34,18 @@ struct Summary<'a> {
 }
 
 pub fn run(args: &RemapArgs) -> anyhow::Result<ExitCode> {
-    let Some(file) = &args.poses else { return build_another(args) };
+    if let Some(output) = &args.output {
+        return build_another(args, output);
+    }
+    let Some(file) = &args.poses else {
+        let reason = "give a file of new poses, or another map with -o";
+        return Err(Error::argument("--poses", reason).into());
+    };
+    if let Some(url) = url_of(&args.map) {
+        let reason = "a map in a bucket is read-only: build another map from its scans with -o, or `voxtile pull` it, \
+                      change the copy, and `voxtile push` it";
+        return Err(Error::argument(url, reason).into());
+    }
     let map = whole_map(&args.map)?;
     let started = Instant::now();
     let tolerance = args.tolerance.as_deref().map(tolerance_of).transpose()?;
@@ -99,21 +111,22 @@ fn tolerance_of(text: &str) -> voxtile::Result<(f64, f64)> {
 }
 
 /// Builds another map from the same scans.
-fn build_another(args: &RemapArgs) -> anyhow::Result<ExitCode> {
-    let Some(output) = &args.output else {
-        return Err(Error::argument("--poses", "give a file of new poses, or another map with -o").into());
-    };
+fn build_another(args: &RemapArgs, output: &Path) -> anyhow::Result<ExitCode> {
     if args.replay.keep_as.is_some() || args.replay.dry_run {
-        let reason = "need --poses; with -o the map does not change";
+        let reason = "cannot be combined with -o, which does not change the map";
         return Err(Error::argument("--keep-as, --dry-run", reason).into());
     }
     let job = Job::of(&args.replay)?;
     let reader = MapAt::of(&args.map)?.open()?;
     let config = config_of(args, reader.config(), job.replay.memory)?;
     let rays = |rays: &RayConfig| rays_of(args, rays);
-    let outcome = rebuild(&reader, whole_map(output)?, config, rays, &job.replay.stop, |done, all| {
-        job.progress.set(done, all)
-    });
+    let poses = match &args.poses {
+        Some(file) => poses_for(&pose_file(args, file)?, &reader.kept_summary()?)?,
+        None => NewPoses::Numbered(Vec::new()),
+    };
+    let progress = |done, all| job.progress.set(done, all);
+    let stop = &job.replay.stop;
+    let outcome = rebuild_with_poses(&reader, whole_map(output)?, config, rays, &poses, stop, progress);
     let mapped = match job.ended(outcome)? {
         Ok(mapped) => mapped,
         Err(code) => return Ok(code),
@@ -170,7 +183,8 @@ fn pose_file<'a>(args: &'a RemapArgs, path: &'a Path) -> voxtile::Result<PoseFil
     let body_from_sensor = args.extrinsic.as_deref().map(Mount::of).transpose()?.map(|mount| mount.rigid);
     let tolerance_ns = tolerance_ns(args.pose_tolerance)?;
     // Next to the map, as in builds: the system's temporary folder may be in memory.
-    let scratch = args.map.ancestors().skip(1).find(|folder| folder.is_dir()).unwrap_or(Path::new("."));
+    let map = args.output.as_ref().unwrap_or(&args.map);
+    let scratch = map.ancestors().skip(1).find(|folder| folder.is_dir()).unwrap_or(Path::new("."));
     let budget = Budget { scratch: Some(scratch.to_owned()), ..Budget::default() };
     let which = args.interpolate.unwrap_or_default();
     Ok(PoseFile { path, calib: args.calib.as_deref(), body_from_sensor, tolerance_ns, budget, which })

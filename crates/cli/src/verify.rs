@@ -96,6 +96,13 @@ fn print(args: &VerifyArgs, verification: &Verification, out: &mut impl Write) -
         ),
         (0, true) => writeln!(out, "intact: all checksums match"),
         (0, false) => writeln!(out, "unverified: the map has no checksums; its tables are well-formed"),
+        (damage, _) if url_of(&args.map).is_some() => {
+            let findings = Counted(*damage, "finding");
+            writeln!(
+                out,
+                "damaged: {findings}; send the map again with `voxtile push --resend` from its folder"
+            )
+        }
         (damage, _) => {
             let (findings, map) = (Counted(*damage, "finding"), args.map.display());
             writeln!(out, "damaged: {findings}; restore files from a backup, or run `voxtile repair {map}`")

@@ -25,7 +25,7 @@ mod revision;
 pub use mark_moving::mark_moving;
 pub use new_poses::NewPoses;
 pub use online_remap::OnlineRemap;
-pub use rebuild::{Rebuilt, ScansWithout, rebuild};
+pub use rebuild::{Rebuilt, ScansWithout, rebuild, rebuild_with_poses};
 pub use remap::{Remap, Remapped, remap};
 pub use remap_in_parts::{RemapPart, join_remap, remap_columns, remap_part};
 pub use remove_points::{PointsRemoved, remove_points};

@@ -40,6 +40,22 @@ impl NewPoses {
     }
 }
 
+/// Returns the pose of a scan that gets a new one.
+///
+/// # Errors
+///
+/// The points of the scan are in the world frame.
+pub(super) fn check_can_move(scan: &KeptScanHead) -> Result<Pose> {
+    scan.world_from_sensor.ok_or_else(|| {
+        let reason = format!(
+            "the points of scan {} are in the world frame, so a pose cannot move them; insert scans in the sensor's \
+             frame",
+            scan.number
+        );
+        Error::argument("poses", reason)
+    })
+}
+
 fn check_numbers(scans: &[KeptScanHead], numbers: impl Iterator<Item = u64>) -> Result<()> {
     let known: FxHashSet<u64> = scans.iter().map(|scan| scan.number).collect();
     refuse("the map keeps no scan with the number", numbers.filter(|number| !known.contains(number)))

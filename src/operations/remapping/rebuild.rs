@@ -1,7 +1,8 @@
+use super::new_poses::{NewPoses, check_can_move};
 use super::retiling::Retiling;
 use crate::config::{Layers, MapConfig, RayConfig};
 use crate::error::{Error, Result};
-use crate::mapper::{MapReader, MapView, Mapper, OutOfCoreTileMapper};
+use crate::mapper::{KeptScan, MapReader, MapView, Mapper, OutOfCoreTileMapper};
 use crate::scan::{ScanReport, Stop};
 use crate::store::{InputRecord, KeptRecord, MapPath, StagedMap, TileStore};
 use serde::Serialize;
@@ -68,6 +69,23 @@ pub fn rebuild(
     stop: &Stop,
     progress: impl FnMut(u64, u64),
 ) -> Result<Rebuilt> {
+    rebuild_with_poses(map, output, config, rays, &NewPoses::Numbered(Vec::new()), stop, progress)
+}
+
+/// As [`rebuild`], with new poses. Scans without a new pose keep theirs.
+///
+/// # Errors
+///
+/// As for [`rebuild`]; missing, surplus or non-finite poses; a new pose of a scan whose points are in the world frame.
+pub fn rebuild_with_poses(
+    map: &MapReader,
+    output: impl Into<MapPath>,
+    config: MapConfig,
+    rays: impl Fn(&RayConfig) -> RayConfig,
+    poses: &NewPoses,
+    stop: &Stop,
+    progress: impl FnMut(u64, u64),
+) -> Result<Rebuilt> {
     let retiling = Retiling::between(&map.config().grid, &config.grid);
     let rays = |own: &RayConfig| retiling.rays(own).map(|own| rays(&own));
     let of_map = RayConfig { region: map.config().rays.region, ..config.rays };
@@ -84,13 +102,21 @@ pub fn rebuild(
     scans.check_keeps_all()?;
     scans.check_marks(|_| false)?;
     check_filled(&map.config().layers(), with_points, &scans_without)?;
+    let poses = poses.by_number(&scans)?;
+    for scan in scans.scans().iter().filter(|scan| poses.contains_key(&scan.number)) {
+        check_can_move(scan)?;
+    }
     let count = scans.scans().len() as u64;
     drop(scans);
     let (disk, folder) = output.into().into_parts();
     let create =
         |unfinished: &Path| OutOfCoreTileMapper::create(MapPath::on(disk.clone(), unfinished), config);
     let mut made = StagedMap::begin_by(disk.clone(), &folder, create)?;
-    let mapped = map_scans(map, made.writer(), rays, stop, count, progress)?;
+    let moved = |scan: KeptScan| match poses.get(&scan.number()) {
+        Some(pose) => scan.with_pose(pose.clone()),
+        None => scan,
+    };
+    let mapped = map_scans(map, made.writer(), moved, rays, stop, count, progress)?;
     made.finish()?;
     Ok(Rebuilt { scans_without, ..mapped })
 }
@@ -117,6 +143,7 @@ fn check_filled(own: &Layers, scans: u64, without: &ScansWithout) -> Result<()> 
 fn map_scans(
     map: &MapReader,
     mapper: &mut OutOfCoreTileMapper,
+    moved: impl Fn(KeptScan) -> KeptScan,
     rays: impl Fn(&RayConfig) -> Result<RayConfig>,
     stop: &Stop,
     count: u64,
@@ -128,7 +155,7 @@ fn map_scans(
     let mut mapped = Rebuilt::default();
     for scan in map.kept_scans()? {
         stop.check()?;
-        let scan = scan?;
+        let scan = moved(scan?);
         mapper.set_rays(rays(scan.rays())?)?;
         mapped.report += mapper.insert_points(&scan)?;
         mapped.scans += 1;

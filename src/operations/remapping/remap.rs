@@ -1,4 +1,4 @@
-use super::new_poses::NewPoses;
+use super::new_poses::{NewPoses, check_can_move};
 use super::replay::{Replay, Replayed, replay};
 use super::revision::{Change, Changes};
 use crate::error::{Error, Result};
@@ -118,14 +118,7 @@ impl Remapped {
         let NewPose { world_from_sensor: new, sweep } = new;
         let is_same_motion =
             old_sweep.is_none() || sweep.as_deref().is_none_or(|sweep| Some(sweep) == old_sweep);
-        let Some(old) = scan.world_from_sensor else {
-            let reason = format!(
-                "the points of scan {} are in the world frame, so a pose cannot move them; insert scans in the \
-                 sensor's frame",
-                scan.number
-            );
-            return Err(Error::argument("poses", reason));
-        };
+        let old = check_can_move(scan)?;
         if old == *new && is_same_motion {
             return Ok(false);
         }

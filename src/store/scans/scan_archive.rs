@@ -276,17 +276,22 @@ impl ScanArchive {
     ///
     /// Damage or an I/O error.
     pub fn copy(&mut self, place: SegmentPlace) -> Result<SegmentPlace> {
-        let layout = self.files.layout().clone();
-        self.copy_from(&layout, place)
+        let (disk, layout) = (self.files.disk().clone(), self.files.layout().clone());
+        self.copy_from(&*disk, &layout, place)
     }
 
-    /// Like [`ScanArchive::copy`], from another map on the same disk.
+    /// Like [`ScanArchive::copy`], from another map.
     ///
     /// # Errors
     ///
     /// Damage or an I/O error.
-    pub(crate) fn copy_from(&mut self, layout: &Layout, place: SegmentPlace) -> Result<SegmentPlace> {
-        let mut scan = SegmentReader::open(&**self.files.disk(), layout, place)?;
+    pub(crate) fn copy_from(
+        &mut self,
+        disk: &dyn Disk,
+        layout: &Layout,
+        place: SegmentPlace,
+    ) -> Result<SegmentPlace> {
+        let mut scan = SegmentReader::open(disk, layout, place)?;
         let (segment, start) = self.open_segment()?;
         let copied = segment.copy(&mut scan);
         self.unsynced.insert(start.segment);

@@ -31,13 +31,14 @@ fn which_scans(text: &str) -> Result<WhichScans, String> {
 #[derive(Debug, Args)]
 #[command(
     allow_negative_numbers = true,
-    override_usage = "voxtile remap [OPTIONS] <MAP> --poses <FILE>\n       voxtile remap [OPTIONS] <MAP> -o <MAP2>"
+    override_usage = "voxtile remap [OPTIONS] <MAP> --poses <FILE>\n       voxtile remap [OPTIONS] <MAP> [--poses <FILE>] -o \
+                      <MAP2>"
 )]
 pub struct RemapArgs {
     #[arg(help = help::MAP_WITH_SCANS)]
     pub map: PathBuf,
     /// New poses, sensor to world, in a format of build --poses; one per scan in order, or by time stamp
-    #[arg(long, value_name = "FILE", required_unless_present = "output", conflicts_with = "output")]
+    #[arg(long, value_name = "FILE", required_unless_present = "output")]
     pub poses: Option<PathBuf>,
     #[arg(long, value_name = "FILE", requires = "poses", help = help::CALIB)]
     pub calib: Option<PathBuf>,
@@ -58,9 +59,9 @@ pub struct RemapArgs {
         default_missing_value = "stamps", value_parser = which_scans)]
     pub interpolate: Option<WhichScans>,
     /// Ignore moves and turns up to this size, such as 0.02m,0.1deg
-    #[arg(long, value_name = "METRES,DEGREES", requires = "poses")]
+    #[arg(long, value_name = "METRES,DEGREES", requires = "poses", conflicts_with = "output")]
     pub tolerance: Option<String>,
-    /// Build another map from the same scans with other parameters instead of changing this one
+    /// Build another map from the same scans, with new poses or other parameters, instead of changing this one
     #[arg(short = 'o', long = "output", value_name = "MAP2")]
     pub output: Option<PathBuf>,
     /// With -o: edge length of a voxel, in metres [default: the map's]

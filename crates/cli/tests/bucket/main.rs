@@ -4,6 +4,7 @@ mod city;
 mod failing_stores;
 mod faulty_store;
 mod fetched_files;
+mod kept_scans;
 mod pushes;
 mod s3_server;
 mod server;
