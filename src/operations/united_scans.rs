@@ -1,7 +1,9 @@
 use super::map_writer::MapWriter;
 use crate::error::{Error, Result};
 use crate::mapper::MapReader;
-use crate::space::TileBox;
+use crate::persistence::PointReader;
+use crate::scan::PointAttributes;
+use crate::space::{Point, TileBox};
 use crate::store::{
     CatalogEntry, Disk, KeptRecord, KeptRecords, Layout, MapPath, SegmentPlace, SegmentReader,
 };
@@ -211,7 +213,9 @@ impl<'a> UnitedScans<'a> {
         scan.updates += same.updates;
         scan.tiles.extend(&same.tiles);
         let [a, b] = [self.holder, part].map(|part| &self.parts[part]);
-        Ok(is_same_scan(scan, same) && have_same_points(a, scan.place, b, same.place)?)
+        Ok(is_same_scan(scan, same)
+            && (have_same_bytes(a, scan.place, b, same.place)?
+                || have_same_points(a, scan.place, b, same.place)?))
     }
 
     fn differs(&self, part: usize, number: u64) -> Error {
@@ -239,7 +243,8 @@ fn is_same_scan(a: &KeptRecord, b: &KeptRecord) -> bool {
     of_scan(a) == of_scan(b)
 }
 
-fn have_same_points(a: &Part<'_>, of_a: SegmentPlace, b: &Part<'_>, of_b: SegmentPlace) -> Result<bool> {
+/// Returns whether the same points are stored as the same bytes, which is the usual case and the faster test.
+fn have_same_bytes(a: &Part<'_>, of_a: SegmentPlace, b: &Part<'_>, of_b: SegmentPlace) -> Result<bool> {
     if of_a.bytes != of_b.bytes {
         return Ok(false);
     }
@@ -251,5 +256,46 @@ fn have_same_points(a: &Part<'_>, of_a: SegmentPlace, b: &Part<'_>, of_b: Segmen
             (one, other) if one == other => {}
             _ => return Ok(false),
         }
+    }
+}
+
+/// Returns whether the points are the same to the bit. Their bytes may differ, because the form of a block depends on the
+/// scans that a part keeps before it.
+fn have_same_points(a: &Part<'_>, of_a: SegmentPlace, b: &Part<'_>, of_b: SegmentPlace) -> Result<bool> {
+    let open = |part: &Part<'_>, place| part.explained(PointReader::open(&*part.disk, &part.layout, place));
+    let mut readers = [(a, open(a, of_a)?), (b, open(b, of_b)?)];
+    let mut blocks: [PointsOfBlock; 2] = Default::default();
+    loop {
+        let mut are_more = [false; 2];
+        for (((part, reader), block), is_more) in readers.iter_mut().zip(&mut blocks).zip(&mut are_more) {
+            let PointsOfBlock { points, intensities, attributes } = block;
+            *is_more = part.explained(reader.next(points, intensities, attributes))?;
+        }
+        if !blocks[0].equals(&blocks[1]) || are_more[0] != are_more[1] {
+            return Ok(false);
+        }
+        if !are_more[0] {
+            return Ok(true);
+        }
+    }
+}
+
+#[derive(Default)]
+struct PointsOfBlock {
+    points: Vec<Point>,
+    intensities: Vec<f32>,
+    attributes: PointAttributes,
+}
+
+impl PointsOfBlock {
+    fn equals(&self, other: &Self) -> bool {
+        let are_same = |(a, b): (&f64, &f64)| a.to_bits() == b.to_bits();
+        let [points, of_other] = [self, other].map(|block| block.points.as_flattened());
+        let intensities = self.intensities.iter().zip(&other.intensities);
+        points.len() == of_other.len()
+            && self.intensities.len() == other.intensities.len()
+            && points.iter().zip(of_other).all(are_same)
+            && intensities.into_iter().all(|(a, b)| a.to_bits() == b.to_bits())
+            && self.attributes == other.attributes
     }
 }
