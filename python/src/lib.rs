@@ -36,6 +36,7 @@ mod options;
 mod pose;
 mod questions;
 mod remapping;
+mod replay_parts;
 mod report;
 mod scan;
 mod scan_iterator;
@@ -69,9 +70,9 @@ mod _voxtile {
         verify,
     };
     #[pymodule_export]
-    use super::remapping::{
-        clean, join_remap, remap, remap_as, remap_columns, remap_part, remove_points, remove_scans,
-    };
+    use super::remapping::{clean, remap, remap_as, remove_points, remove_scans};
+    #[pymodule_export]
+    use super::replay_parts::{count_kept_scans, join_replay, replay_columns, replay_part, search_points};
     #[pymodule_export]
     use super::report::InsertReport;
     #[pymodule_export]

@@ -7,7 +7,7 @@ from .building import BuildOptions, build
 from .columns import decay, merge, verify
 from .comparing import CompareOptions, compare
 from .jobs import export, statistics
-from .remapping import remap
+from .remapping import remap, remove_points, remove_scans
 from .tiles import Tile, map_tiles
 
 __all__ = [
@@ -21,6 +21,8 @@ __all__ = [
     "map_tiles",
     "merge",
     "remap",
+    "remove_points",
+    "remove_scans",
     "statistics",
     "verify",
 ]
