@@ -21,6 +21,7 @@
 
 mod arrays;
 mod calls;
+mod cleaning;
 mod command;
 mod compare;
 mod config;
@@ -50,6 +51,8 @@ mod _voxtile {
     #[pymodule_export]
     use super::calls::{call_build, call_export, call_export_scans};
     #[pymodule_export]
+    use super::cleaning::{check_replay, map_for_search, search_columns, search_moving};
+    #[pymodule_export]
     use super::command::run_command;
     #[pymodule_export]
     use super::compare::{Change, Comparison, compare, compare_part, join_parts};
@@ -72,7 +75,7 @@ mod _voxtile {
     #[pymodule_export]
     use super::remapping::{clean, remap, remap_as, remove_points, remove_scans};
     #[pymodule_export]
-    use super::replay_parts::{count_kept_scans, join_replay, replay_columns, replay_part, search_points};
+    use super::replay_parts::{join_replay, replay_columns, replay_part, search_points};
     #[pymodule_export]
     use super::report::InsertReport;
     #[pymodule_export]

@@ -14,18 +14,24 @@ use voxtile::mapper::KeptSummary;
 use voxtile::operations::{self, PointsInBox, Remap, Replay, ReplayPart, ScanChange, ScanSelection};
 use voxtile::store::{FsDisk, UnsyncedDisk};
 use voxtile::{Error, MapPath, Result, TileBox};
+use voxtile_clean::{AllMarks, FoundMarks};
 
 /// Change of kept scans as Python describes it: a dict with its kind and the arguments of the operation.
 enum AskedChange {
     Move(Asked),
     Remove(ScanSelection),
     RemovePoints(PointsInBox),
+    /// Files of found marks of moving points, and their texts.
+    Mark(Vec<(PathBuf, FoundMarks)>),
+    Unmark,
 }
 
 /// Change of the scans of one flush.
 struct ReadChange {
     scans: KeptSummary,
     change: ScanChange,
+    /// The found marks of a change that marks points.
+    found: Option<AllMarks>,
 }
 
 impl AskedChange {
@@ -56,6 +62,12 @@ impl AskedChange {
                     searches.and_then(PointsInBox::joined).map_err(|error| exception(py, &error))?,
                 )
             }
+            "mark" => {
+                let found: Vec<(PathBuf, String)> = given("found")?.extract()?;
+                let found = found.into_iter().map(|(path, text)| Ok((path, read_text("found", &text)?)));
+                Self::Mark(found.collect::<Result<_>>().map_err(|error| exception(py, &error))?)
+            }
+            "unmark" => Self::Unmark,
             other => return Err(wrong(py, "change", format!("{other:?} is no kind of change"))),
         })
     }
@@ -64,12 +76,27 @@ impl AskedChange {
         let change = match self {
             Self::Move(asked) => {
                 let (scans, poses, how) = asked.read(replay.clone())?;
-                return Ok(ReadChange { scans, change: ScanChange::Move(poses, how.tolerance) });
+                let change = ScanChange::Move(poses, how.tolerance);
+                return Ok(ReadChange { scans, change, found: None });
             }
             Self::Remove(selection) => ScanChange::Remove(selection),
             Self::RemovePoints(found) => ScanChange::RemovePoints(found),
+            Self::Mark(found) => {
+                let scans = KeptSummary::read(folder_of(map)?)?;
+                let found = AllMarks::of(&scans, map, &found)?;
+                return Ok(ReadChange {
+                    scans,
+                    change: ScanChange::Mark(found.new_marks()),
+                    found: Some(found),
+                });
+            }
+            Self::Unmark => {
+                let scans = KeptSummary::read(folder_of(map)?)?;
+                let change = ScanChange::Mark(voxtile_clean::unmarked(&scans));
+                return Ok(ReadChange { scans, change, found: None });
+            }
         };
-        Ok(ReadChange { scans: KeptSummary::read(folder_of(map)?)?, change })
+        Ok(ReadChange { scans: KeptSummary::read(folder_of(map)?)?, change, found: None })
     }
 }
 
@@ -93,7 +120,7 @@ pub fn replay_columns(
     let change = AskedChange::of(py, &map, change)?;
     watched(py, |stop| {
         let how = Replay::default().with_stop(stop.clone());
-        let ReadChange { scans, change } = change.read(&map, &how)?;
+        let ReadChange { scans, change, .. } = change.read(&map, &how)?;
         let columns = operations::replay_columns(&scans, &change, &how, tiles)?;
         Ok(columns.into_iter().map(Into::into).collect())
     })
@@ -116,7 +143,7 @@ pub fn replay_part(
     let replay = replay_of(py, None, false, memory.as_ref())?;
     watched(py, |stop| {
         let how = replay.with_stop(stop.clone());
-        let ReadChange { scans, change } = change.read(&map, &how)?;
+        let ReadChange { scans, change, .. } = change.read(&map, &how)?;
         let disk = Arc::new(UnsyncedDisk::of(Arc::new(FsDisk)));
         let output = MapPath::on(disk, folder_of(&output)?);
         let region = TileBox::of_column(column, tiles);
@@ -146,7 +173,7 @@ pub fn join_replay<'py>(
     let report = reported(py, None, |stop, _| {
         let parts: Vec<_> = parts.iter().map(read_part).collect::<Result<_>>()?;
         let how = replay.with_stop(stop.clone()).with_parts(parts);
-        let ReadChange { scans, change } = change.read(&map, &how)?;
+        let ReadChange { scans, change, found } = change.read(&map, &how)?;
         let no_progress = |_, _| {};
         let report = match change {
             ScanChange::Move(poses, tolerance) => {
@@ -166,6 +193,10 @@ pub fn join_replay<'py>(
             ScanChange::RemovePoints(found) => {
                 serde_json::to_value(operations::remove_found_points(&scans, &found, &how, no_progress)?)
             }
+            ScanChange::Mark(_) => serde_json::to_value(match &found {
+                Some(found) => voxtile_clean::clean_found(&scans, found, &how)?,
+                None => voxtile_clean::undo(folder_of(&map)?, &how, |_, _, _| {})?,
+            }),
             _ => return Err(Error::argument("change", "cannot be joined")),
         };
         report.map_err(|error| Error::argument("report", error.to_string()))
@@ -186,15 +217,5 @@ pub fn search_points(
     watched(py, |stop| {
         let scans = KeptSummary::read(folder_of(&map)?)?;
         written_text(&PointsInBox::search(&scans, &region, first..=last, stop)?)
-    })
-}
-
-/// The number of kept scans, and of the last one (0 without scans).
-#[pyfunction]
-pub fn count_kept_scans(py: Python<'_>, map: PathBuf) -> PyResult<(usize, u64)> {
-    watched(py, |_| {
-        let scans = KeptSummary::read(folder_of(&map)?)?;
-        scans.check_keeps_all()?;
-        Ok((scans.scans().len(), scans.scans().last().map_or(0, |scan| scan.number)))
     })
 }

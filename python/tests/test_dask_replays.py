@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 import pytest
 import voxtile
+from test_remapping import wall_with_passer_by
 from voxtile import errors
 
 distributed = pytest.importorskip("distributed")
@@ -222,12 +223,95 @@ def test_a_resumed_call_uses_finished_parts(
     assert digests(map) == digests(one)
 
 
-def test_killed_workers_do_not_change_the_result(maps: tuple[Path, Path]) -> None:
-    map, one = maps
+@pytest.fixture
+def walls(tmp_path: Path) -> tuple[Path, Path]:
+    """A map of a wall that somebody passes in one scan and stands before in two others, and a copy."""
+    how: Any = {"resolution": 0.2, "tile_size": 2.0, "max_range": 9.0, "clearing": "guarded", "keep_scans": True}
+    with voxtile.Map.create(tmp_path / "map", **how) as map:
+        for number in range(12):
+            points = wall_with_passer_by(number)
+            stands = (points[:, 1] > 1.0) & (number in (5, 6))
+            points[stands] *= 0.5
+            map.insert(points, pose=([0, 0, 0], [0, 0, 0, 1]))
+    shutil.copytree(tmp_path / "map", tmp_path / "one")
+    return tmp_path / "map", tmp_path / "one"
+
+
+def moving_points(map: Path) -> int:
+    scans = voxtile.scans(map)
+    return sum(0 if scans.moving is None else int(scans.moving.sum()) for _ in scans)
+
+
+def test_moving_points_are_those_of_one_process(client: object, walls: tuple[Path, Path]) -> None:
+    map, one = walls
+    before = digests(map)
+    counts = []
+    # The marks of the first call must not matter to the others.
+    calls: list[dict[str, Any]] = [
+        {},
+        {"parked_scans": 2},
+        {"region": [[-9, -9, -9], [9, 0, 9]]},
+        {"parked_scans": 1},
+        {"undo": True},
+    ]
+    for number, call in enumerate(calls):
+        dry = voxtile_dask.clean(map, **call, dry_run=True, client=client)
+        name = f"before_{number}"
+        report = voxtile_dask.clean(map, **call, keep_as=name, region_size=4.0, client=client, memory="64MiB")
+        wanted = voxtile.clean(one, **call)
+        assert digests(map) == digests(one), call
+        assert without_counts(report) == without_counts(wanted) and dry["scans_changed"] == wanted["scans_changed"]
+        assert voxtile.verify(map)["findings"] == []
+        counts.append(moving_points(map))
+    # A thing that stays for two scans is parked.
+    assert counts[0] > counts[1] > 0 and counts[0] > counts[2] > 0
+    assert counts[3:] == [0, 0] and digests(map) == before
+    assert not map.with_name("map.replay.parts").exists()
+    for wrong in {"parked_scans": 0}, {"undo": True, "parked_scans": 2}:
+        with pytest.raises(errors.ArgumentError, match=next(iter(wrong))):
+            voxtile_dask.clean(map, **wrong, client=client)
+
+
+def test_a_search_of_moving_points_is_resumed(
+    client: object, walls: tuple[Path, Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    map, one = walls
+    how: dict[str, Any] = {"parked_scans": 2, "region_size": 4.0, "client": client}
+
+    def fail(*_: Any, **__: Any) -> None:
+        raise OSError("x")
+
+    for step in ("join", "replay_columns", "join_replay"):
+        with monkeypatch.context() as failing:
+            failing.setattr(f"voxtile.dask.replaying.{step}", fail)
+            with pytest.raises(OSError, match="x"):
+                voxtile_dask.clean(map, **how)
+    parts = map.with_name("map.replay.parts")
+    result = next(path for path in sorted(parts.glob("*.result")) if path.stat().st_size)
+    content = bytearray(result.read_bytes())
+    content[0] ^= 1
+    result.write_bytes(content)
+    with pytest.raises(errors.VoxtileError, match=f"{result}.*remove it and its text"):
+        voxtile_dask.clean(map, **how)
+    result.unlink()
+    result.with_suffix(".json").unlink()
+    seen: list[tuple[int, int]] = []
+    report = voxtile_dask.clean(map, **how, progress=lambda *done: seen.append(done))
+    # One search is made again.
+    assert len(seen) == 1 and report["parts_done_before"] == report["parts"] > 1
+    voxtile.clean(one, parked_scans=2)
+    assert digests(map) == digests(one)
+
+
+def test_killed_workers_do_not_change_the_result(drive: Path, tmp_path: Path) -> None:
+    map, one = tmp_path / "map", tmp_path / "one"
+    voxtile.build(drive, map, **OPTIONS)
+    shutil.copytree(map, one)
     cluster = distributed.LocalCluster(n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None)
     changes: list[Callable[[Any, Path, Any], Any]] = [
         lambda module, path, how: module.remove_scans(path, scans=(5, 6), **how),
         lambda module, path, how: module.remove_points(path, BOX, **how),
+        lambda module, path, how: module.clean(path, parked_scans=3, **how),
     ]
     killed = 0
     with cluster, distributed.Client(cluster) as client:
@@ -239,7 +323,7 @@ def test_killed_workers_do_not_change_the_result(maps: tuple[Path, Path]) -> Non
                 while not is_over.wait(0.15):
                     processes = [worker.process for worker in list(cluster.workers.values())]
                     pids = [process.pid for process in processes if process is not None and process.pid]
-                    if killed < 4 and pids:
+                    if killed < 6 and pids:
                         os.kill(pids[killed % len(pids)], signal.SIGKILL)
                         killed += 1
 

@@ -22,6 +22,7 @@ __all__ = [
     "call_build",
     "call_export",
     "call_export_scans",
+    "check_replay",
     "class_style",
     "clean",
     "clear",
@@ -29,7 +30,6 @@ __all__ = [
     "compare_part",
     "compute_distances",
     "convert",
-    "count_kept_scans",
     "count_scans",
     "crop",
     "decay",
@@ -42,6 +42,7 @@ __all__ = [
     "join",
     "join_parts",
     "join_replay",
+    "map_for_search",
     "merge",
     "move_shard",
     "open_scans",
@@ -56,6 +57,8 @@ __all__ = [
     "revert",
     "run_command",
     "scan_reaches",
+    "search_columns",
+    "search_moving",
     "search_points",
     "snapshots",
     "verify",
@@ -392,7 +395,32 @@ def join_replay(
     memory: int | str | None = None,
 ) -> dict[str, Any]: ...
 def search_points(map: _Path, region: ArrayLike, first: int, last: int) -> str: ...
-def count_kept_scans(map: _Path) -> tuple[int, int]: ...
+def check_replay(
+    map: _Path, *, keep_as: str | None = None, memory: int | str | None = None
+) -> tuple[int, int, bool]: ...
+def search_columns(map: _Path, tiles: int) -> list[tuple[int, int]]: ...
+def map_for_search(
+    map: _Path,
+    kind: Literal["reversed", "unmarked", "counts"],
+    column: tuple[int, int],
+    tiles: int,
+    output: _Path,
+    *,
+    shard_of: str,
+    maps: tuple[_Path, _Path | None, _Path | None] | None = None,
+    memory: int | str | None = None,
+) -> None: ...
+def search_moving(
+    map: _Path,
+    maps: tuple[_Path, _Path | None, _Path | None],
+    first: int,
+    last: int,
+    output: _Path,
+    *,
+    region: ArrayLike | None = None,
+    parked_scans: int | None = None,
+    memory: int | str | None = None,
+) -> str: ...
 def class_style(number: int, /) -> tuple[str, tuple[int, int, int]]: ...
 def clean(
     map: _Path,

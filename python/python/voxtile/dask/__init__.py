@@ -4,6 +4,7 @@
 """
 
 from .building import BuildOptions, build
+from .cleaning import clean
 from .columns import decay, merge, verify
 from .comparing import CompareOptions, compare
 from .jobs import export, statistics
@@ -15,6 +16,7 @@ __all__ = [
     "CompareOptions",
     "Tile",
     "build",
+    "clean",
     "compare",
     "decay",
     "export",

@@ -47,7 +47,7 @@ def remap(
     change = {"kind": "move", "poses": given, "interpolate": interpolate, "tolerance": tolerance}
     key = ["move", _digest(given), interpolate, tolerance]
     with replaying(map, region_size=region_size, memory=memory, client=client, progress=progress) as work:
-        return work.join(change, key=key, keep_as=keep_as, from_snapshots=False)
+        return work.join(change, key=key, keep_as=keep_as)
 
 
 def remove_scans(
@@ -97,15 +97,14 @@ def remove_points(
     corners = np.asarray(region, np.float64)
     key = ["remove_points", corners.tolist()]
     with replaying(map, region_size=region_size, memory=memory, client=client, progress=progress) as work:
+        _, last, _ = _voxtile.check_replay(work.map, memory=memory)
         # Without scans, one search reports an invalid box.
-        scans = _voxtile.count_kept_scans(work.map)
-        searches = work.search("points", _search_points, scans, corners, key=key)
-        searches = searches or [_voxtile.search_points(work.map, corners, 1, 1)]
+        searches = [text for _, text in work.search("points", _search_points, max(last, 1), corners, key=key)]
         change = {"kind": "remove_points", "searches": searches}
-        return work.join(change, key=key, keep_as=keep_as, from_snapshots=False)
+        return work.join(change, key=key, keep_as=keep_as)
 
 
-def _search_points(map: str, corners: Any, first: int, last: int) -> str:
+def _search_points(map: str, corners: Any, first: int, last: int, _: str) -> str:
     return _voxtile.search_points(map, corners, first, last)
 
 

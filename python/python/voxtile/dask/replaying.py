@@ -7,15 +7,16 @@ import json
 import os
 import re
 import tempfile
+import uuid
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
 import distributed
 
-from .._voxtile import describe, join_replay, replay_columns, replay_part, verify
+from .._voxtile import describe, join, join_replay, replay_columns, replay_part, search_columns, verify
 from ..errors import ArgumentError, VoxtileError
 from . import losses
 from .shards import locked, move_to_place, remove
@@ -24,10 +25,16 @@ from .simulation import advised_region_size
 # The type hints of `distributed` are incomplete.
 _dask: Any = distributed
 
-# Names of the files that calls leave in the folder of parts: shards, and texts.
-_OWN_NAMES = re.compile(r"attempt-[0-9a-f]{32}(\.unfinished)?|[0-9a-f]{16}(-[a-z]+)?(-(-?[0-9]+)){2}(\.(json|new))?")
+# Names of the files that calls leave in the folder of parts: shards, maps joined of shards, results of searches, texts.
+_OWN_NAMES = re.compile(
+    r"attempt-[0-9a-f]{32}(\.unfinished)?|[0-9a-f]{16}-[a-z]+(\.unfinished)?"
+    r"|[0-9a-f]{16}(-[a-z]+)?(-(-?[0-9]+)){2}(\.(json|new|result))?"
+)
 
-# Memory and files of the results of searches bound the number of their tasks.
+# A shard of a map that a search needs: the arguments are the map, column, edge of a column in tiles, and the output.
+_MakeShard = Callable[[str, tuple[int, int], int, str, str], None]
+
+# The results of searches have a file each, which bounds the number of their tasks.
 _MAX_SEARCHES = 256
 
 
@@ -53,28 +60,56 @@ class Replaying:
         if not size >= tile_size:
             raise ArgumentError(f"region_size: {size} m is less than a tile of {tile_size} m; use more")
         self._tiles = round(min(size / tile_size, 1e6))
-        self._done_before = 0
 
-    def search(
-        self, name: str, task: Callable[..., str], scans: tuple[int, int], *arguments: Any, key: Any
-    ) -> list[str]:
-        """Runs a task for each range of scans, and returns their texts. ``scans`` are the number of scans and the last
-        number; a task gets the map, the arguments, and the first and the last scan.
+    def search(self, name: str, task: Callable[..., str], last: int, *arguments: Any, key: Any) -> list[tuple[str, str]]:
+        """Runs a task for each range of the scans up to number ``last``. Returns the file that each may have written,
+        and its text. A task gets the map, the arguments, the first and the last scan, and the file.
         """
-        count, last = scans
         step = max(-(-last // _MAX_SEARCHES), 1)
         ranges = [(first, min(first + step - 1, last)) for first in range(1, last + 1, step)]
         mark = self._mark(name, key)
-        names = [self._parts / f"{mark}-{name}-{first}-{end}" for first, end in ranges] if count else []
-        work = [
-            (str(place), task, (self.map, *arguments, first, end))
-            for place, (first, end) in zip(names, ranges)
+        names = [self._parts / f"{mark}-{name}-{first}-{end}" for first, end in ranges]
+        futures = [
+            self._client.submit(_run_search, str(place), task, (self.map, *arguments, *scans), pure=False, retries=2)
+            for place, scans in zip(names, ranges)
             if _read(place) is None
         ]
-        self._run([self._client.submit(_run_search, *given, pure=False, retries=2) for given in work], 0, len(names))
-        return [_read(place) or "" for place in names]
+        self._run(futures, len(names) - len(futures), len(names))
+        return [(f"{place}.result", _read(place) or "") for place in names]
 
-    def join(self, change: dict[str, Any], *, key: Any, keep_as: str | None, from_snapshots: bool) -> dict[str, Any]:
+    def make_map(self, kind: str, task: _MakeShard, columns: Sequence[tuple[int, int]], *, key: Any) -> str:
+        """Makes a map of shards that tasks make, unless an earlier call has made it. Returns its path. A task gets the
+        map, the column, the edge of a column in tiles, the output, and the id of the map to make.
+        """
+        mark = self._mark(kind, key)
+        made = self._parts / f"{mark}-{kind}"
+        if made.exists():
+            return str(made)
+        names = [self._parts / f"{mark}-{kind}-{x}-{y}" for x, y in columns or [(0, 0)]]
+        futures = [
+            self._client.submit(
+                _make_shard,
+                task,
+                (self.map, column, self._tiles),
+                str(name),
+                mark * 2,
+                pure=False,
+                retries=2,
+            )
+            for name, column in zip(names, columns or [(0, 0)])
+            if not name.exists()
+        ]
+        self._run(futures, len(names) - len(futures), len(names))
+        join([str(name) for name in names], str(made))
+        return str(made)
+
+    def columns_of_scans(self) -> list[tuple[int, int]]:
+        """The columns that scans reach."""
+        return search_columns(self.map, self._tiles)
+
+    def join(
+        self, change: dict[str, Any], *, key: Any, keep_as: str | None, from_snapshots: bool = False
+    ) -> dict[str, Any]:
         """Replays the columns that the change affects, and commits it. ``key`` identifies the change."""
         columns = replay_columns(self.map, change, self._tiles)
         mark = self._mark(key)
@@ -166,7 +201,23 @@ def _write(name: str, text: str) -> None:
 
 
 def _run_search(name: str, task: Callable[..., str], arguments: Sequence[Any]) -> None:
-    _write(name, task(*arguments))
+    # Another attempt may write at the same time.
+    attempt = os.path.join(os.path.dirname(name), f"attempt-{uuid.uuid4().hex}")
+    try:
+        text = task(*arguments, attempt)
+        if os.path.exists(attempt):
+            os.replace(attempt, f"{name}.result")
+    finally:
+        with suppress(FileNotFoundError):
+            os.unlink(attempt)
+    _write(name, text)
+
+
+def _make_shard(task: _MakeShard, arguments: tuple[str, tuple[int, int], int], name: str, map_id: str) -> None:
+    with tempfile.TemporaryDirectory(prefix="voxtile-", dir=_dask.get_worker().local_directory) as local:
+        made = os.path.join(local, "map")
+        task(*arguments, made, map_id)
+        move_to_place(made, name, map_id)
 
 
 def _replay_column(
