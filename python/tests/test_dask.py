@@ -651,6 +651,30 @@ def test_an_update_of_a_concurrently_changed_map_is_an_error(client: object, dri
         voxtile_dask.build(again, city, update=True, client=client, keep_scans=True)
 
 
+def test_an_update_whose_parts_lack_a_scan_is_an_error(
+    client: object, drive: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    again, city = _again(drive, tmp_path), tmp_path / "city"
+    voxtile.build(drive, city, keep_scans=True, **OPTIONS)
+    before = voxtile.digest(city), voxtile.scan_digest(city)
+    replace_tiles = voxtile.dask.building.replace_tiles
+    with monkeypatch.context() as broken:
+        broken.setattr(
+            "voxtile.dask.building.replace_tiles", lambda map, parts, **how: replace_tiles(map, parts[:1], **how)
+        )
+        with pytest.raises(errors.ArgumentError, match="no part keeps scan"):
+            voxtile_dask.build(again, city, update=True, region_size=4.0, client=client, **OPTIONS)
+    assert (voxtile.digest(city), voxtile.scan_digest(city)) == before
+    assert voxtile.verify(city)["findings"] == []
+    # The same call continues, with all parts.
+    report = voxtile_dask.build(again, city, update=True, region_size=4.0, client=client, **OPTIONS)
+    assert report["regions_done_before"] == report["regions"]
+    voxtile.build(drive, tmp_path / "whole", keep_scans=True, **OPTIONS)
+    voxtile.build(again, tmp_path / "whole", append=True, again=True, **OPTIONS)
+    for digest in voxtile.digest, voxtile.scan_digest:
+        assert digest(city) == digest(tmp_path / "whole")
+
+
 def test_each_visit_of_a_region_is_read(client: object, drive: Path, tmp_path: Path) -> None:
     """Thirty scans elsewhere between two visits of the street."""
     folder, scans = tmp_path / "round", sorted(drive.glob("*.pcd"))

@@ -23,8 +23,8 @@ pub(crate) struct Stays {
 
 #[derive(Debug)]
 enum Counts {
-    Own(StagedMap<OutOfCoreTileMapper>),
-    OfParts(MapReader),
+    Own(Box<StagedMap<OutOfCoreTileMapper>>),
+    OfParts(Box<MapReader>),
 }
 
 impl StayCounter {
@@ -52,7 +52,7 @@ impl StayCounter {
 
     /// Ends the count. A thing stays if at least `min_scans` scans hit it in the same voxel.
     pub(crate) fn finish(self, min_scans: u32) -> Stays {
-        Stays { counts: Counts::Own(self.counts), min_scans }
+        Stays { counts: Counts::Own(Box::new(self.counts)), min_scans }
     }
 }
 
@@ -72,7 +72,7 @@ pub(crate) fn count_in(counts: &mut OutOfCoreTileMapper, voxels: &HitVoxels) -> 
 impl Stays {
     /// Counts that [`count_in`] has made in a map.
     pub(crate) fn of(counts: MapReader, min_scans: u32) -> Self {
-        Self { counts: Counts::OfParts(counts), min_scans }
+        Self { counts: Counts::OfParts(Box::new(counts)), min_scans }
     }
 
     /// Clears the record that voxels were seen through where something stayed.
