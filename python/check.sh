@@ -4,7 +4,7 @@
 #
 #   python/check.sh [--short] [PYTEST ARGUMENTS]
 #
-# --short skips Dask clusters, the notebooks and pyright, which take three minutes and rarely fail. It uses the module
+# --short skips Dask clusters, the notebooks and pyright, which take several minutes and rarely fail. It uses the module
 # in VOXTILE_BIN that `cargo build --workspace --features voxtile-python/extension-module` has built, because a wheel
 # with other features would recompile half of the dependencies.
 #
@@ -22,7 +22,7 @@ install() { "$python" -m pip install --quiet --disable-pip-version-check "$@"; }
 install dask distributed matplotlib 'moto[s3,server]' mypy pytest
 left_out=()
 if [[ $short ]]; then
-    for file in dask dask_jobs dask_shards notebooks; do left_out+=("--ignore=tests/test_$file.py"); done
+    for file in dask dask_jobs dask_replays dask_shards notebooks; do left_out+=("--ignore=tests/test_$file.py"); done
 else
     install ipykernel nbclient pyright
 fi

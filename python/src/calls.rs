@@ -16,9 +16,9 @@ use voxtile_pipeline::{Listener, Watch, WhichPoints, build, export, export_scans
 
 /// Builds a map. Returns the report that `voxtile build` prints with `--json`, as a dict. With `shard_of`, 32
 /// hexadecimal digits, it builds a shard of the map with this id; the shard is not durable until `move_shard` has moved
-/// it.
+/// it. `scans_before` is the number of scans of that map, if the shard is part of an update.
 #[pyfunction]
-#[pyo3(signature = (scans, output, options, progress=None, *, shard_of=None))]
+#[pyo3(signature = (scans, output, options, progress=None, *, shard_of=None, scans_before=0))]
 pub fn call_build<'py>(
     py: Python<'py>,
     scans: Paths,
@@ -26,9 +26,11 @@ pub fn call_build<'py>(
     options: &Bound<'py, PyDict>,
     progress: Option<Py<PyAny>>,
     shard_of: Option<&str>,
+    scans_before: u64,
 ) -> PyResult<Bound<'py, PyAny>> {
     let mut options = build_options(py, scans, output, Keywords::of(options)?)?;
     options.piece_of = shard_of.map(|digits| map_id_of(py, "shard_of", digits)).transpose()?;
+    options.scans_before = scans_before;
     called(py, progress, move |watch| {
         let summary = build(&options, watch)?.ok_or(Error::Stopped)?;
         Ok(serde_json::to_value(summary)?)

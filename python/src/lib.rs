@@ -21,6 +21,7 @@
 
 mod arrays;
 mod calls;
+mod cleaning;
 mod command;
 mod compare;
 mod config;
@@ -36,6 +37,7 @@ mod options;
 mod pose;
 mod questions;
 mod remapping;
+mod replay_parts;
 mod report;
 mod scan;
 mod scan_iterator;
@@ -48,6 +50,8 @@ mod watched;
 mod _voxtile {
     #[pymodule_export]
     use super::calls::{call_build, call_export, call_export_scans};
+    #[pymodule_export]
+    use super::cleaning::{check_replay, map_for_search, search_columns, search_moving};
     #[pymodule_export]
     use super::command::run_command;
     #[pymodule_export]
@@ -69,9 +73,9 @@ mod _voxtile {
         verify,
     };
     #[pymodule_export]
-    use super::remapping::{
-        clean, join_remap, remap, remap_as, remap_columns, remap_part, remove_points, remove_scans,
-    };
+    use super::remapping::{clean, remap, remap_as, remove_points, remove_scans};
+    #[pymodule_export]
+    use super::replay_parts::{join_replay, replay_columns, replay_part, search_points};
     #[pymodule_export]
     use super::report::InsertReport;
     #[pymodule_export]

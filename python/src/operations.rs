@@ -13,6 +13,7 @@ use voxtile::integrity::VerifyScope;
 use voxtile::mapper::{MapReader, MapView, OctreeMap};
 use voxtile::operations::{self, AreaPart, CopyScans, Decay, MaxAge, Part, Prefer};
 use voxtile::space::Grid;
+use voxtile::store::InputRecord;
 use voxtile::{MapPath, MemoryLimit, Result, SnapshotName, Stop, TileIndex, integrity};
 use voxtile_pipeline::place::{check_is_folder, place_of};
 use voxtile_pipeline::{PolygonFile, check_is_no_file, octree_file};
@@ -210,15 +211,16 @@ pub fn join<'py>(
 }
 
 /// Replaces tiles of a map by those of shards, in one commit. The shards were made from the map at the flush
-/// `of_flush`, and each holds other tiles; `scans` is the number of scans they add.
+/// `of_flush`, and each holds other tiles; `scans` is the number of scans they add, of an input with the name `input`.
 #[pyfunction]
-#[pyo3(signature = (map, parts, *, of_flush, scans, progress=None))]
+#[pyo3(signature = (map, parts, *, of_flush, scans, input=None, progress=None))]
 pub fn replace_tiles<'py>(
     py: Python<'py>,
     map: PathBuf,
     parts: Vec<PathBuf>,
     of_flush: u64,
     scans: u64,
+    input: Option<&str>,
     progress: Callback,
 ) -> PyResult<Bound<'py, PyAny>> {
     reported(py, progress, |_, progress| {
@@ -226,7 +228,9 @@ pub fn replace_tiles<'py>(
             .iter()
             .map(|part| MapReader::open(part, MemoryLimit::DEFAULT_BYTES))
             .collect::<Result<Vec<_>>>()?;
-        operations::replace_tiles(&map, &parts, of_flush, scans, |done, all| progress.report(done, all))
+        operations::replace_tiles(&map, &parts, of_flush, scans, input, |done, all| {
+            progress.report(done, all)
+        })
     })
 }
 
@@ -240,7 +244,7 @@ pub fn default_tile_size(py: Python<'_>, resolution: f64) -> PyResult<f64> {
 }
 
 /// Describes a map: id, flush and scan numbers, number of records in its list of scans (`None` if unknown), grid and
-/// range in metres, whether it keeps its scans.
+/// range in metres, whether it keeps its scans, inputs.
 #[pyfunction]
 pub fn describe<'py>(py: Python<'py>, map: MapOrSnapshot) -> PyResult<Bound<'py, PyAny>> {
     reported(py, None, |_, _| {
@@ -251,12 +255,30 @@ pub fn describe<'py>(py: Python<'py>, map: MapOrSnapshot) -> PyResult<Bound<'py,
             scan_number: map.scan_number(),
             scan_records: map.metadata().ext.as_ref().and_then(|ext| ext.scan_records),
             keeps_scans: map.keeps_scans(),
+            inputs: map
+                .metadata()
+                .ext
+                .as_ref()
+                .map_or(vec![], |ext| ext.inputs.iter().map(Input::of).collect()),
             resolution: map.config().grid.resolution_m(),
             tile_size: map.config().grid.tile_size_m(),
             max_range: map.config().rays.max_range_m,
         };
         Ok(described)
     })
+}
+
+/// Input of a map: its name, and the number of scans before it.
+#[derive(Serialize)]
+struct Input {
+    name: String,
+    first_scan: u64,
+}
+
+impl Input {
+    fn of(input: &InputRecord) -> Self {
+        Self { name: input.name.clone(), first_scan: input.first_scan }
+    }
 }
 
 /// Report of [`describe`].
@@ -267,6 +289,7 @@ struct Described {
     scan_number: u64,
     scan_records: Option<u64>,
     keeps_scans: bool,
+    inputs: Vec<Input>,
     resolution: f64,
     tile_size: f64,
     max_range: Option<f64>,
@@ -275,7 +298,7 @@ struct Described {
 /// Makes a map of the part of another that is inside a box, or outside it. `polygon` replaces the box: a GeoJSON file of
 /// polygons in the map's coordinates, with heights `z`, the lowest and the highest, in metres (default: all). With
 /// `keep_scans` the new map keeps the kept scans that reach the part (see `voxtile crop --keep-scans`). With `shard_of`
-/// it makes a shard of the map with this id; the shard is not durable until `move_shard` has moved it.
+/// it makes a shard of the map with this id, which with `keep_scans` keeps the scans that are added to it; the shard is not durable until `move_shard` has moved it.
 #[pyfunction]
 #[pyo3(signature = (map, output, region=None, *, polygon=None, z=None, outside=false, keep_scans=false, shard_of=None,
     progress=None))]
@@ -315,7 +338,7 @@ pub fn crop<'py>(
         let report = |done, all| progress.report(done, all);
         match shard_of {
             None => operations::crop(&map.open()?, &part, scans, &output, report),
-            Some(map_id) => operations::crop_shard(&map.open()?, &part, &output, map_id, report),
+            Some(map_id) => operations::crop_shard(&map.open()?, &part, keep_scans, &output, map_id, report),
         }
     })
 }

@@ -6,20 +6,17 @@ use crate::layers::layers_of;
 use crate::map::region_of;
 use crate::operations::{Callback, MapOrSnapshot, folder_of, name_of, reported};
 use crate::pose::pose_of;
-use crate::watched::watched;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use std::path::PathBuf;
-use std::sync::Arc;
+use std::path::{Path, PathBuf};
 use voxtile::mapper::KeptSummary;
-use voxtile::operations::{self, NewPoses, Remap, RemapPart, Replay, ScanSelection};
-use voxtile::store::{FsDisk, UnsyncedDisk};
-use voxtile::{Error, InsertMode, MapPath, MapView, Result, TileBox};
+use voxtile::operations::{self, NewPoses, Remap, Replay, ScanSelection};
+use voxtile::{Error, InsertMode, MapView, Result};
 use voxtile_clean::Clean;
 use voxtile_pipeline::interpolated_poses;
 
 /// Returns the options common to all replays.
-fn replay_of(
+pub fn replay_of(
     py: Python<'_>,
     keep_as: Option<&str>,
     dry_run: bool,
@@ -59,7 +56,7 @@ pub fn remap<'py>(
 }
 
 /// Converts poses: a dict of scan numbers and poses, or one pose per scan in order.
-fn new_poses_of(poses: &Bound<'_, PyAny>) -> PyResult<NewPoses> {
+pub fn new_poses_of(poses: &Bound<'_, PyAny>) -> PyResult<NewPoses> {
     Ok(match poses.cast::<PyDict>() {
         Ok(numbered) => {
             let poses = numbered.iter().map(|(number, pose)| Ok((number.extract()?, pose_of(&pose)?)));
@@ -70,17 +67,17 @@ fn new_poses_of(poses: &Bound<'_, PyAny>) -> PyResult<NewPoses> {
 }
 
 /// New poses for a map.
-struct Asked {
-    map: PathBuf,
-    poses: NewPoses,
-    interpolate: bool,
+pub struct Asked {
+    pub map: PathBuf,
+    pub poses: NewPoses,
+    pub interpolate: bool,
     /// Metres and degrees.
-    tolerance: Option<(f64, f64)>,
+    pub tolerance: Option<(f64, f64)>,
 }
 
 impl Asked {
     /// Reads the summary of the scans, and returns the poses of all that move.
-    fn read(&self, replay: Replay) -> Result<(KeptSummary, NewPoses, Remap)> {
+    pub fn read(&self, replay: Replay) -> Result<(KeptSummary, NewPoses, Remap)> {
         let tolerance = self.tolerance.map(|(moved_m, turned_deg)| (moved_m, turned_deg.to_radians()));
         let scans = KeptSummary::read(folder_of(&self.map)?)?;
         let poses = match &self.poses {
@@ -92,83 +89,6 @@ impl Asked {
         };
         Ok((scans, poses, Remap::new(replay).with_tolerance(tolerance)))
     }
-}
-
-/// Columns of tiles, by their index in units of `tiles`, that new poses may change: the parts of a remap that several
-/// processes share.
-#[pyfunction]
-#[pyo3(signature = (map, poses, tiles, *, interpolate=false, tolerance=None))]
-pub fn remap_columns(
-    py: Python<'_>,
-    map: PathBuf,
-    poses: &Bound<'_, PyAny>,
-    tiles: u32,
-    interpolate: bool,
-    tolerance: Option<(f64, f64)>,
-) -> PyResult<Vec<(i32, i32)>> {
-    let asked = Asked { map, poses: new_poses_of(poses)?, interpolate, tolerance };
-    watched(py, |stop| {
-        let (scans, poses, how) = asked.read(Replay::default().with_stop(stop.clone()))?;
-        let columns = operations::remap_columns(&scans, &poses, &how, tiles)?;
-        Ok(columns.into_iter().map(Into::into).collect())
-    })
-}
-
-/// Replays the tiles of a column as a shard, `output`, which is durable after `move_shard`. Returns a text for
-/// `join_remap`. Without tiles to replay there is no shard.
-#[pyfunction]
-#[pyo3(signature = (map, poses, column, tiles, output, *, interpolate=false, tolerance=None, memory=None))]
-#[expect(clippy::too_many_arguments, reason = "keywords, in Python")]
-pub fn remap_part(
-    py: Python<'_>,
-    map: PathBuf,
-    poses: &Bound<'_, PyAny>,
-    column: [i32; 2],
-    tiles: u32,
-    output: PathBuf,
-    interpolate: bool,
-    tolerance: Option<(f64, f64)>,
-    memory: Option<Bound<'_, PyAny>>,
-) -> PyResult<String> {
-    let asked = Asked { map, poses: new_poses_of(poses)?, interpolate, tolerance };
-    let replay = replay_of(py, None, false, memory.as_ref())?;
-    watched(py, |stop| {
-        let (scans, poses, how) = asked.read(replay.with_stop(stop.clone()))?;
-        let disk = Arc::new(UnsyncedDisk::of(Arc::new(FsDisk)));
-        let output = MapPath::on(disk, folder_of(&output)?);
-        let region = TileBox::of_column(column, tiles);
-        let part = operations::remap_part(&scans, &poses, &how, region, output, |_, _| {})?;
-        serde_json::to_string(&part).map_err(|error| Error::argument("part", error.to_string()))
-    })
-}
-
-/// Applies new poses with the parts of all columns: the shard of each, if there is one, and its text. One commit changes
-/// the map.
-#[pyfunction]
-#[pyo3(signature = (map, poses, parts, *, interpolate=false, tolerance=None, keep_as=None, memory=None))]
-#[expect(clippy::too_many_arguments, reason = "keywords, in Python")]
-pub fn join_remap<'py>(
-    py: Python<'py>,
-    map: PathBuf,
-    poses: &Bound<'py, PyAny>,
-    parts: Vec<(Option<PathBuf>, String)>,
-    interpolate: bool,
-    tolerance: Option<(f64, f64)>,
-    keep_as: Option<&str>,
-    memory: Option<Bound<'py, PyAny>>,
-) -> PyResult<Bound<'py, PyAny>> {
-    let asked = Asked { map, poses: new_poses_of(poses)?, interpolate, tolerance };
-    let replay = replay_of(py, keep_as, false, memory.as_ref())?;
-    reported(py, None, |stop, _| {
-        let (scans, poses, how) = asked.read(replay.with_stop(stop.clone()))?;
-        let part = |(shard, text): &(Option<PathBuf>, String)| {
-            let part: RemapPart =
-                serde_json::from_str(text).map_err(|error| Error::argument("parts", error.to_string()))?;
-            Ok((shard.as_ref().map(MapPath::from), part))
-        };
-        let parts: Vec<_> = parts.iter().map(part).collect::<Result<_>>()?;
-        operations::join_remap(&scans, &poses, &how, &parts)
-    })
 }
 
 /// Makes a new map of the scans that a map keeps, with other parameters. Parameters that are not passed are those of
@@ -248,12 +168,7 @@ pub fn remove_scans<'py>(
     memory: Option<Bound<'py, PyAny>>,
     progress: Callback,
 ) -> PyResult<Bound<'py, PyAny>> {
-    let selection = match (scans, time, input) {
-        (Some((first, last)), None, None) => ScanSelection::Numbers(first, last),
-        (None, Some((first, last)), None) => ScanSelection::Time(first, last),
-        (None, None, Some(name)) => ScanSelection::Input(name),
-        _ => return Err(wrong(py, "scans", "pass exactly one of scans, time and input")),
-    };
+    let selection = selection_of(py, scans, time, input)?;
     let how = replay_of(py, keep_as, dry_run, memory.as_ref())?;
     let report = reported(py, progress, |stop, progress| {
         let how = how.with_stop(stop.clone());
@@ -261,6 +176,30 @@ pub fn remove_scans<'py>(
             progress.report(done, all)
         })
     })?;
+    removal_reported(py, &map, report)
+}
+
+/// Returns the scans to remove.
+pub fn selection_of(
+    py: Python<'_>,
+    scans: Option<(u64, u64)>,
+    time: Option<(i64, i64)>,
+    input: Option<String>,
+) -> PyResult<ScanSelection> {
+    match (scans, time, input) {
+        (Some((first, last)), None, None) => Ok(ScanSelection::Numbers(first, last)),
+        (None, Some((first, last)), None) => Ok(ScanSelection::Time(first, last)),
+        (None, None, Some(name)) => Ok(ScanSelection::Input(name)),
+        _ => Err(wrong(py, "scans", "pass exactly one of scans, time and input")),
+    }
+}
+
+/// Returns the report of a removal of scans, or raises `SnapshotsFailedError` with it.
+pub fn removal_reported<'py>(
+    py: Python<'py>,
+    map: &Path,
+    report: Bound<'py, PyAny>,
+) -> PyResult<Bound<'py, PyAny>> {
     let failed: Vec<Bound<'py, PyAny>> = report.get_item("snapshots_failed")?.extract()?;
     if failed.is_empty() {
         return Ok(report);

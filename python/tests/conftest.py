@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -70,3 +72,19 @@ def matrix_of(pose: NDArray[np.float64]) -> NDArray[np.float64]:
 def room() -> list[Scan]:
     """A few scans of a room."""
     return scans_of(7)
+
+
+@pytest.fixture
+def drive(tmp_path: Path) -> Path:
+    """Scans along a street, seven metres apart."""
+    folder = tmp_path / "drive"
+    folder.mkdir()
+    header = "# .PCD v0.7\nVERSION 0.7\nFIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1\n"
+    poses = []
+    for number, (points, pose) in enumerate(scans_of(11, count=12)):
+        pose[0] = 0.7 * number - 3.1
+        sizes = f"WIDTH {len(points)}\nHEIGHT 1\nVIEWPOINT 0 0 0 1 0 0 0\nPOINTS {len(points)}\nDATA binary\n"
+        (folder / f"{number:03}.pcd").write_bytes((header + sizes).encode() + points.tobytes())
+        poses.append(matrix_of(pose)[:3].reshape(-1))
+    np.savetxt(folder / "poses_kitti.txt", poses, fmt="%.17g")
+    return folder

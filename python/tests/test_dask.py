@@ -18,29 +18,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 import voxtile
-from conftest import matrix_of, scans_of
+from conftest import scans_of
 from voxtile import errors
 
 distributed = pytest.importorskip("distributed")
 voxtile_dask = pytest.importorskip("voxtile.dask")
 
 OPTIONS = {"resolution": 0.25, "tile_size": 2.0, "max_range": 4.0}
-
-
-@pytest.fixture
-def drive(tmp_path: Path) -> Path:
-    """Scans along a street, seven metres apart."""
-    folder = tmp_path / "drive"
-    folder.mkdir()
-    header = "# .PCD v0.7\nVERSION 0.7\nFIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1\n"
-    poses = []
-    for number, (points, pose) in enumerate(scans_of(11, count=12)):
-        pose[0] = 0.7 * number - 3.1
-        sizes = f"WIDTH {len(points)}\nHEIGHT 1\nVIEWPOINT 0 0 0 1 0 0 0\nPOINTS {len(points)}\nDATA binary\n"
-        (folder / f"{number:03}.pcd").write_bytes((header + sizes).encode() + points.tobytes())
-        poses.append(matrix_of(pose)[:3].reshape(-1))
-    np.savetxt(folder / "poses_kitti.txt", poses, fmt="%.17g")
-    return folder
 
 
 @pytest.fixture
@@ -111,7 +95,7 @@ def test_new_poses_by_many_workers(
             poses[number, 0, 3] += by
         # A failed commit leaves the finished parts.
         with monkeypatch.context() as failing:
-            failing.setattr("voxtile.dask.remapping.join_remap", lambda *_, **__: (_ for _ in ()).throw(OSError("x")))
+            failing.setattr("voxtile.dask.replaying.join_replay", lambda *_, **__: (_ for _ in ()).throw(OSError("x")))
             with pytest.raises(OSError, match="x"):
                 voxtile_dask.remap(tmp_path / "map", poses, **options)
         seen: list[tuple[int, int]] = []
@@ -122,7 +106,7 @@ def test_new_poses_by_many_workers(
         for digest in voxtile.digest, voxtile.scan_digest:
             assert digest(tmp_path / "map") == digest(tmp_path / "one")
     assert voxtile.verify(tmp_path / "map")["findings"] == []
-    assert not (tmp_path / "map.remap.parts").exists()
+    assert not (tmp_path / "map.replay.parts").exists()
     # Some poses; the others follow.
     some = {1: poses[0], 12: poses[11] @ np.diag([1.0, 1.0, 1.0, 1.0])}
     some[12][1, 3] += 1.0
@@ -399,7 +383,7 @@ def test_a_worker_on_another_file_system_copies_its_parts(
 
 
 def test_unsupported_options_are_errors(client: object, drive: Path, tmp_path: Path) -> None:
-    for name, value in {"region_size": 1.0, "every": 2, "keep_scans": True}.items():
+    for name, value in {"region_size": 1.0, "every": 2}.items():
         with pytest.raises(errors.ArgumentError, match=f"^{name}: "):
             voxtile_dask.build(drive, tmp_path / "map", client=client, **{**OPTIONS, name: value})
     (tmp_path / "map").mkdir()
@@ -509,12 +493,18 @@ def _again(drive: Path, tmp_path: Path) -> Path:
     return folder
 
 
+@pytest.mark.parametrize("keeps", [False, True])
 @pytest.mark.parametrize("region_size", [4.0, 5.3, 100.0])
 def test_new_drives_into_a_map_make_the_map_of_one_build(
-    client: object, region_size: float, drive: Path, tmp_path: Path
+    client: object, region_size: float, keeps: bool, drive: Path, tmp_path: Path
 ) -> None:
     again, city = _again(drive, tmp_path), tmp_path / "city"
-    voxtile.build(drive, tmp_path / "whole", **OPTIONS)
+    # A scan that reaches no region.
+    content = (again / "004.pcd").read_bytes()
+    at = content.index(b"binary\n") + len(b"binary\n")
+    far = np.frombuffer(content[at:], np.float32) * np.float32(np.inf)
+    (again / "004.pcd").write_bytes(content[:at] + far.tobytes())
+    voxtile.build(drive, tmp_path / "whole", keep_scans=keeps, **OPTIONS)
     shutil.copytree(tmp_path / "whole", city)
     before = voxtile.digest(city)
     with voxtile.open(city) as reader:
@@ -534,6 +524,16 @@ def test_new_drives_into_a_map_make_the_map_of_one_build(
     for map in (city, tmp_path / "whole"):
         voxtile.build(drive, map, append=True, again=True, **OPTIONS)
     assert voxtile.digest(city) == voxtile.digest(tmp_path / "whole")
+    if keeps:
+        assert voxtile.scan_digest(city) == voxtile.scan_digest(tmp_path / "whole")
+        # The scans can be replayed.
+        for map in (city, tmp_path / "whole"):
+            voxtile.remove_points(map, [[-2, -9, -9], [1, 9, 9]])
+            report = voxtile.remove_scans(map, input="again")
+            assert report["scans_removed"] == 12
+        assert voxtile.digest(city) == voxtile.digest(tmp_path / "whole")
+        assert voxtile.scan_digest(city) == voxtile.scan_digest(tmp_path / "whole")
+        assert voxtile.verify(city)["findings"] == []
 
 
 def test_an_update_with_killed_workers_is_atomic(drive: Path, tmp_path: Path) -> None:
@@ -568,11 +568,18 @@ def test_an_update_with_killed_workers_is_atomic(drive: Path, tmp_path: Path) ->
 
 @pytest.mark.parametrize("killed_in", ["replace_tiles", "remove"])
 @pytest.mark.parametrize("is_changed", [False, True])
+@pytest.mark.parametrize("keeps", [False, True])
 def test_an_update_killed_at_its_end_is_applied_once(
-    client: object, killed_in: str, is_changed: bool, drive: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    client: object,
+    killed_in: str,
+    is_changed: bool,
+    keeps: bool,
+    drive: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     again, city, whole = _again(drive, tmp_path), tmp_path / "city", tmp_path / "whole"
-    voxtile.build(drive, city, **OPTIONS)
+    voxtile.build(drive, city, keep_scans=keeps, **OPTIONS)
     shutil.copytree(city, whole)
 
     def fail(*_: object, **__: object) -> None:
@@ -640,6 +647,32 @@ def test_an_update_of_a_concurrently_changed_map_is_an_error(client: object, dri
         voxtile_dask.build(again, tmp_path / "none", update=True, client=client)
     with pytest.raises(errors.ArgumentError, match="^resolution: "):
         voxtile_dask.build(again, city, update=True, client=client, resolution=0.5)
+    with pytest.raises(errors.ArgumentError, match="^keep_scans: an update cannot begin to"):
+        voxtile_dask.build(again, city, update=True, client=client, keep_scans=True)
+
+
+def test_an_update_whose_parts_lack_a_scan_is_an_error(
+    client: object, drive: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    again, city = _again(drive, tmp_path), tmp_path / "city"
+    voxtile.build(drive, city, keep_scans=True, **OPTIONS)
+    before = voxtile.digest(city), voxtile.scan_digest(city)
+    replace_tiles = voxtile.dask.building.replace_tiles
+    with monkeypatch.context() as broken:
+        broken.setattr(
+            "voxtile.dask.building.replace_tiles", lambda map, parts, **how: replace_tiles(map, parts[:1], **how)
+        )
+        with pytest.raises(errors.ArgumentError, match="no part keeps scan"):
+            voxtile_dask.build(again, city, update=True, region_size=4.0, client=client, **OPTIONS)
+    assert (voxtile.digest(city), voxtile.scan_digest(city)) == before
+    assert voxtile.verify(city)["findings"] == []
+    # The same call continues, with all parts.
+    report = voxtile_dask.build(again, city, update=True, region_size=4.0, client=client, **OPTIONS)
+    assert report["regions_done_before"] == report["regions"]
+    voxtile.build(drive, tmp_path / "whole", keep_scans=True, **OPTIONS)
+    voxtile.build(again, tmp_path / "whole", append=True, again=True, **OPTIONS)
+    for digest in voxtile.digest, voxtile.scan_digest:
+        assert digest(city) == digest(tmp_path / "whole")
 
 
 def test_each_visit_of_a_region_is_read(client: object, drive: Path, tmp_path: Path) -> None:

@@ -442,17 +442,19 @@ impl OutOfCoreTileMapper {
         Ok(Self::new(config, store))
     }
 
-    /// Replays a kept scan within the selected tiles, or all; also returns the tiles that it changed.
+    /// Replays a kept scan within the selected tiles, or all. Returns the number of updates and the tiles that it
+    /// changed.
     pub(crate) fn replay_scan(
         &mut self,
         number: u64,
         scan: &dyn ScanPoints,
         rays: &RayConfig,
         selection: Option<&TileSelection>,
-    ) -> Result<(ScanReport, Vec<TileIndex>)> {
+    ) -> Result<(u64, Vec<TileIndex>)> {
         self.config.rays = *rays;
         self.pager().set_scan_number(number.saturating_sub(1));
-        self.map(scan, selection)
+        let (report, tiles) = self.map(scan, selection)?;
+        Ok((report.hits + report.misses, tiles))
     }
 
     /// Runs `work` on the store, to write a catalog of kept scans or to complete a commit.

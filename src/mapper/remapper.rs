@@ -1,7 +1,7 @@
 use super::{OutOfCoreTileMapper, ShadowMapper};
 use crate::config::{MapConfig, RayConfig};
 use crate::error::Result;
-use crate::scan::{MovingMarks, ScanPoints, ScanReport, Stop};
+use crate::scan::{MovingMarks, ScanPoints, Stop};
 use crate::space::{TileIndex, TileSelection};
 use crate::store::{CatalogEntry, KeptMarks, KeptRecord, SegmentPlace, TileStore};
 
@@ -29,14 +29,14 @@ impl Remapper {
         Ok(Self { mapper, scan_number })
     }
 
-    /// Traces a scan within the selected tiles, or all; also returns the tiles that it changed.
+    /// Traces a scan within the selected tiles, or all. Returns the number of updates and the tiles that it changed.
     pub(crate) fn map(
         &mut self,
         number: u64,
         scan: &dyn ScanPoints,
         rays: &RayConfig,
         selection: Option<&TileSelection>,
-    ) -> Result<(ScanReport, Vec<TileIndex>)> {
+    ) -> Result<(u64, Vec<TileIndex>)> {
         self.mapper.replay_scan(number, scan, rays, selection)
     }
 

@@ -1,7 +1,7 @@
 use super::{KeptScan, OutOfCoreTileMapper};
 use crate::config::MapConfig;
 use crate::error::{Error, Result};
-use crate::scan::{ScanReport, Stop};
+use crate::scan::Stop;
 use crate::space::{TileIndex, TileSelection};
 use crate::store::{CatalogEntry, SideFolder, TileStore};
 
@@ -38,7 +38,7 @@ impl ShadowMapper {
         &mut self,
         scan: &KeptScan,
         selection: Option<&TileSelection>,
-    ) -> Result<(ScanReport, Vec<TileIndex>)> {
+    ) -> Result<(u64, Vec<TileIndex>)> {
         self.mapper.replay_scan(scan.number(), scan, scan.rays(), selection)
     }
 

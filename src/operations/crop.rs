@@ -6,7 +6,7 @@ use super::table_change::voxels_of_part;
 use crate::error::{Error, Result};
 use crate::mapper::{MapReader, MapView};
 use crate::persistence::{new_map_id, new_metadata};
-use crate::store::{MapPath, Metadata, UnsyncedDisk};
+use crate::store::{CatalogEntry, MapPath, Metadata, UnsyncedDisk};
 use std::path::Path;
 use std::sync::Arc;
 
@@ -32,7 +32,7 @@ pub fn crop(
     progress: impl FnMut(u64, u64),
 ) -> Result<WrittenMap> {
     let part = part.voxels(&map.config().grid)?;
-    crop_to(map, &part, scans, MapPath::on(map.disk(), output), new_map_id(), progress)
+    crop_to(map, &part, ScansOfPart::Copied(scans), MapPath::on(map.disk(), output), new_map_id(), progress)
 }
 
 /// Like [`crop`], for a part of space over an area. Tiles outside of the area are not read, unless the part is all other
@@ -49,11 +49,11 @@ pub fn crop_area(
     progress: impl FnMut(u64, u64),
 ) -> Result<WrittenMap> {
     let part = part.voxels(&map.config().grid)?;
-    crop_to(map, &part, scans, MapPath::on(map.disk(), output), new_map_id(), progress)
+    crop_to(map, &part, ScansOfPart::Copied(scans), MapPath::on(map.disk(), output), new_map_id(), progress)
 }
 
-/// Like [`crop`], for a shard of a future map with the id `map_id` ([`move_shard`](super::move_shard())). The shard is
-/// durable only after [`move_shard`](super::move_shard()): after a crash before that, create it again.
+/// Like [`crop`], for a shard of a future map with the id `map_id` ([`move_shard`](super::move_shard())). With
+/// `keeps_new_scans` the shard keeps scans that are added to it, but none of the map. The shard is durable only after [`move_shard`](super::move_shard()): after a crash before that, create it again.
 ///
 /// # Errors
 ///
@@ -61,19 +61,29 @@ pub fn crop_area(
 pub fn crop_shard(
     map: &MapReader,
     part: &Part,
+    keeps_new_scans: bool,
     output: impl AsRef<Path>,
     map_id: [u8; 16],
     progress: impl FnMut(u64, u64),
 ) -> Result<WrittenMap> {
     let disk = Arc::new(UnsyncedDisk::of(map.disk()));
     let part = part.voxels(&map.config().grid)?;
-    crop_to(map, &part, CopyScans::No, MapPath::on(disk, output), map_id, progress)
+    let scans = if keeps_new_scans { ScansOfPart::New } else { ScansOfPart::Copied(CopyScans::No) };
+    crop_to(map, &part, scans, MapPath::on(disk, output), map_id, progress)
+}
+
+/// Scans that a crop keeps.
+#[derive(Clone, Copy)]
+enum ScansOfPart {
+    Copied(CopyScans),
+    /// Those that are added later.
+    New,
 }
 
 fn crop_to(
     map: &MapReader,
     part: &VoxelPart,
-    scans: CopyScans,
+    scans: ScansOfPart,
     output: MapPath,
     map_id: [u8; 16],
     mut progress: impl FnMut(u64, u64),
@@ -82,7 +92,12 @@ fn crop_to(
     let (disk, output) = output.into_parts();
     let mut writer = MapWriter::create_as(disk, &output, metadata_of_part(map, map_id))?;
     match scans {
-        CopyScans::Yes if map.keeps_scans() => {
+        ScansOfPart::New => {
+            let last = map.scan_number();
+            let mut before = (last > 0).then_some(CatalogEntry::Unlisted(1, last));
+            writer.keep_scans(|_| Ok(before.take()))?;
+        }
+        ScansOfPart::Copied(CopyScans::Yes) if map.keeps_scans() => {
             let tiles = part.tiles(&grid).ok_or_else(|| {
                 let reason = "the scans cannot be limited to all voxels outside: crop a box or polygon, or copy no scans";
                 Error::argument("scans", reason)

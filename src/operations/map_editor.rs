@@ -4,7 +4,7 @@ use crate::persistence::TileSaver;
 use crate::persistence::upgrade;
 use crate::persistence::{config_from, load, new_metadata};
 use crate::space::TileIndex;
-use crate::store::{CatalogEntry, Disk, Extension, MAX_NUMBER, TileStore, TileVersion};
+use crate::store::{CatalogEntry, Disk, Extension, MAX_NUMBER, ScanArchive, TileStore, TileVersion};
 use crate::tile::Table;
 use std::path::Path;
 use std::sync::Arc;
@@ -104,10 +104,23 @@ impl MapEditor {
         self.store.remove(tile)
     }
 
+    /// Keeps more scans of a map that keeps its scans: those that `add` copies to the archive. They are committed by
+    /// [`MapEditor::commit_scans`].
+    pub(super) fn keep_scans(&mut self, add: impl FnOnce(&mut ScanArchive) -> Result<()>) -> Result<()> {
+        self.begin_writing()?;
+        add(self.store.archive_mut())
+    }
+
     /// Commits all changes, including those that `note` makes to the metadata. `what` is the name of the operation.
     pub(super) fn commit(&mut self, what: &str, note: impl FnOnce(&mut Extension)) -> Result<()> {
         self.begin_writing()?;
         self.store.archive_mut().note(CatalogEntry::Operation(what.to_owned()));
+        self.commit_scans(note)
+    }
+
+    /// Commits scans and the tiles that they changed: the scans can still be replayed.
+    pub(super) fn commit_scans(&mut self, note: impl FnOnce(&mut Extension)) -> Result<()> {
+        self.begin_writing()?;
         let mut metadata = self.store.metadata().clone();
         if let Some(ext) = &mut metadata.ext {
             note(ext);

@@ -58,9 +58,10 @@ pub use merge::{Merged, merge};
 pub use merge_rule::Prefer;
 pub use part::{AreaPart, Part};
 pub use remapping::{
-    NewPoses, OnlineRemap, PointsRemoved, Rebuilt, Remap, RemapPart, Remapped, Replay, Replayed,
-    ScanSelection, ScansRemoved, ScansWithout, SnapshotFailure, join_remap, mark_moving, rebuild,
-    rebuild_with_poses, remap, remap_columns, remap_part, remove_points, remove_scans,
+    NewMarks, NewPoses, OnlineRemap, PointsInBox, PointsRemoved, Rebuilt, Remap, Remapped, Replay,
+    ReplayPart, Replayed, ScanChange, ScanSelection, ScansRemoved, ScansWithout, SnapshotFailure,
+    mark_moving, rebuild, rebuild_with_poses, remap, remove_found_points, remove_points, remove_scans,
+    replay_columns, replay_part,
 };
 pub use replace_tiles::{TilesReplaced, replace_tiles};
 pub use revert::{Reverted, revert};

@@ -4,6 +4,7 @@ use crate::error::Result;
 use crate::mapper::{MapReader, MapView};
 use crate::space::{Grid, LAST_VOXEL_INDEX, TileBox};
 use crate::store::{Extension, InputContent, ScanRecord};
+use rustc_hash::FxHashMap;
 
 /// Build that maps are regions of, with the united region; `None` for all of space.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -31,6 +32,8 @@ impl OneBuild {
 pub(super) struct Regions {
     /// Metadata of the first map, and its list of scans. `None` after a map that is not from the same build.
     scans: Option<(Extension, Vec<ScanRecord>)>,
+    /// Number of points of the kept scans.
+    points: FxHashMap<u64, u64>,
     grid: Grid,
     regions: Vec<TileBox>,
 }
@@ -47,7 +50,7 @@ impl Regions {
             Some(ext) => Some((ext, first.scans()?)),
             None => None,
         };
-        Ok(Self { scans, grid: first.config().grid, regions: Vec::new() })
+        Ok(Self { scans, points: FxHashMap::default(), grid: first.config().grid, regions: Vec::new() })
     }
 
     /// # Errors
@@ -59,10 +62,26 @@ impl Regions {
         // The scans of the inputs may be the same, but the lists still differ if scans were removed from one of the
         // maps.
         match own_region(map).filter(|_| are_same) {
-            Some(region) if map.scans()? == *list && !has_marks(map)? => self.regions.push(region),
+            Some(region) if map.scans()? == *list && self.has_same_points(map)? => self.regions.push(region),
             _ => self.scans = None,
         }
         Ok(())
+    }
+
+    /// Returns whether the kept scans of a map have as many points as in the maps before, and no moving points: nothing
+    /// was removed or marked after the build.
+    fn has_same_points(&mut self, map: &MapReader) -> Result<bool> {
+        if !map.keeps_scans() {
+            return Ok(true);
+        }
+        let mut scans = map.kept_scans()?;
+        while let Some(record) = scans.next_record()? {
+            let before = self.points.insert(record.number, record.points);
+            if record.moving.is_some() || before.is_some_and(|points| points != record.points) {
+                return Ok(false);
+            }
+        }
+        Ok(true)
     }
 
     pub(super) fn one_build(self) -> Option<OneBuild> {
@@ -70,20 +89,6 @@ impl Regions {
         let region = united(&self.regions)?;
         Some(OneBuild { region: (!is_all_of_space(region, &self.grid)).then_some(region) })
     }
-}
-
-/// Returns whether moving points of a map were marked after the build.
-fn has_marks(map: &MapReader) -> Result<bool> {
-    if !map.keeps_scans() {
-        return Ok(false);
-    }
-    let mut scans = map.kept_scans()?;
-    while let Some(record) = scans.next_record()? {
-        if record.moving.is_some() {
-            return Ok(true);
-        }
-    }
-    Ok(false)
 }
 
 /// Returns the region of a map, if all its tiles are in it.

@@ -1,10 +1,11 @@
 use super::map_editor::{MapEditor, edit};
 use super::merge::{check_grid, check_layers, check_model, common_crs, have_no_common_tile};
+use super::united_scans::{Part, add_united_scans};
 use crate::error::{Error, Result};
 use crate::mapper::{MapReader, MapView};
 use crate::sensor::Evidence;
 use crate::space::{MortonCode, TileIndex};
-use crate::store::MapPath;
+use crate::store::{Extension, InputContent, InputRecord, MapPath};
 use crate::tile::Table;
 use serde::Serialize;
 
@@ -27,18 +28,20 @@ pub struct TilesReplaced {
 /// Replaces tiles of a map by those of parts, in one commit.
 ///
 /// Each part is a crop of the map as of flush `of_flush`, into which more scans were inserted. No two parts have a tile
-/// in common. `scans` is the number of these scans; the map gets no list of them. Tiles that no part has are unchanged.
-/// `progress` receives the number of tiles done and in total.
+/// in common. `scans` is the number of these scans. A map that keeps its scans keeps them too, each once, as scans of an
+/// input with the name `input`; another map gets no list of them. Tiles that no part has are unchanged. `progress`
+/// receives the number of tiles done and in total.
 ///
 /// # Errors
 ///
-/// No map, another writer, a map that was flushed after `of_flush`, a map that keeps its scans, parts with another grid
-/// or sensor model or with a common tile, a damaged tile, or an I/O error. The map is unchanged then.
+/// No map, another writer, a map that was flushed after `of_flush`, parts with another grid or sensor model or with a
+/// common tile, a scan that no part keeps or that differs between parts, a damaged tile, or an I/O error. The map is unchanged then.
 pub fn replace_tiles(
     map: impl Into<MapPath>,
     parts: &[MapReader],
     of_flush: u64,
     scans: u64,
+    input: Option<&str>,
     mut progress: impl FnMut(u64, u64),
 ) -> Result<TilesReplaced> {
     let (disk, map) = map.into().into_parts();
@@ -50,9 +53,11 @@ pub fn replace_tiles(
         check_layers(part, &before)?;
     }
     common_crs(parts.iter().chain([&before]))?;
-    if before.keeps_scans() {
-        let reason = "the map keeps its scans, but parts have no kept scans; use `voxtile build --append`";
-        return Err(Error::argument(map.display().to_string(), reason));
+    let keeps_scans = before.keeps_scans();
+    if let Some(part) = parts.iter().find(|part| keeps_scans != part.keeps_scans()) {
+        let reason =
+            if keeps_scans { "keeps no scans, but the map does" } else { "keeps scans, unlike the map" };
+        return Err(Error::argument(part.folder().display().to_string(), reason));
     }
     if !have_no_common_tile(parts) {
         return Err(Error::argument("parts", "two parts have the same tile; crop disjoint regions"));
@@ -67,7 +72,12 @@ pub fn replace_tiles(
             );
             return Err(Error::argument("of_flush", reason));
         }
+        let scans_before = editor.scan_number();
         editor.add_scans(scans)?;
+        if keeps_scans {
+            let (parts, region) = (parts.iter().map(Part::open).collect(), editor.config().rays.region);
+            editor.keep_scans(|archive| add_united_scans(archive, parts, region, scans_before, scans))?;
+        }
         let all = parts.iter().map(|part| part.tile_indices().len() as u64).sum();
         let mut replaced = TilesReplaced::default();
         let mut done = 0;
@@ -82,11 +92,20 @@ pub fn replace_tiles(
         }
         progress(all, all);
         if scans > 0 || replaced.tiles_added + replaced.tiles_changed > 0 {
-            editor.commit("adopt", |_| {})?;
+            let note = |ext: &mut Extension| {
+                ext.inputs.extend(input.map(|name| unknown_input(name, scans_before, scans)))
+            };
+            if keeps_scans { editor.commit_scans(note)? } else { editor.commit("adopt", |_| {})? }
         }
         (replaced.scan_number, replaced.flush_number) = (editor.scan_number(), editor.flush_number());
         Ok(replaced)
     })
+}
+
+/// Record of an input that cannot be resumed, because its fingerprint is unknown.
+fn unknown_input(name: &str, first_scan: u64, scans: u64) -> InputRecord {
+    let content = Some(InputContent { scans, ..InputContent::default() });
+    InputRecord { first_scan, content, ..InputRecord::from(name.to_owned()) }
 }
 
 /// Writes a tile if it has changed. An equal tile is not written: its old version would have to be kept for readers and

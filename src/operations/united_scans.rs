@@ -5,7 +5,7 @@ use crate::persistence::PointReader;
 use crate::scan::PointAttributes;
 use crate::space::{Point, TileBox};
 use crate::store::{
-    CatalogEntry, Disk, KeptRecord, KeptRecords, Layout, MapPath, SegmentPlace, SegmentReader,
+    CatalogEntry, Disk, KeptRecord, KeptRecords, Layout, MapPath, ScanArchive, SegmentPlace, SegmentReader,
 };
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -33,18 +33,40 @@ pub(super) fn unite_scans(
         match &mut entry {
             Some(CatalogEntry::Unlisted(first, _)) if !may_lack_scans => return Err(united.lacks(*first)),
             Some(CatalogEntry::Kept(scan)) => {
-                scan.rays.region = region;
-                scan.tiles.sort_unstable();
-                scan.tiles.dedup();
-                let holder = &united.parts[united.holder];
-                for place in scan.places_mut() {
-                    *place = holder.explained(archive.copy_from(&*holder.disk, &holder.layout, *place))?;
-                }
+                united.copy_points(archive, scan, region)?;
             }
             _ => {}
         }
         Ok(entry)
     })
+}
+
+/// Copies the kept scans that parts of an update have added to a map, each once: those after number `before`, `scans` of
+/// them.
+///
+/// # Errors
+///
+/// As for [`unite_scans`], and another number of scans.
+pub(super) fn add_united_scans(
+    archive: &mut ScanArchive,
+    parts: Vec<Part<'_>>,
+    region: Option<TileBox>,
+    before: u64,
+    scans: u64,
+) -> Result<()> {
+    let mut united = UnitedScans::of(parts)?;
+    united.next = before + 1;
+    while let Some(entry) = united.next_entry()? {
+        match entry {
+            CatalogEntry::Kept(mut scan) => {
+                united.copy_points(archive, &mut scan, region)?;
+                archive.note(CatalogEntry::Kept(scan));
+            }
+            CatalogEntry::Unlisted(first, _) => return Err(united.lacks(first)),
+            _ => return Err(united.differs(united.holder, united.next - 1)),
+        }
+    }
+    if united.next <= before + scans { Err(united.lacks(united.next)) } else { Ok(()) }
 }
 
 /// A part whose next scan is so many numbers ahead is closed until then.
@@ -191,6 +213,23 @@ impl<'a> UnitedScans<'a> {
         holders.into_iter().try_for_each(|part| self.advance(part))?;
         self.next = entry.as_ref().and_then(CatalogEntry::numbers).map_or(self.next, |(_, last)| last + 1);
         Ok(entry)
+    }
+
+    /// Copies the points of the last kept scan to another archive.
+    fn copy_points(
+        &self,
+        archive: &mut ScanArchive,
+        scan: &mut KeptRecord,
+        region: Option<TileBox>,
+    ) -> Result<()> {
+        scan.rays.region = region;
+        scan.tiles.sort_unstable();
+        scan.tiles.dedup();
+        let holder = &self.parts[self.holder];
+        for place in scan.places_mut() {
+            *place = holder.explained(archive.copy_from(&*holder.disk, &holder.layout, *place))?;
+        }
+        Ok(())
     }
 
     /// The numbers before this one that no part has a scan for.

@@ -5,7 +5,7 @@ use crate::stays::Stays;
 use std::path::Path;
 use voxtile::mapper::KeptScan;
 use voxtile::scan::{MovingMarks, Stop};
-use voxtile::space::Grid;
+use voxtile::space::{Grid, TileBox};
 use voxtile::{Aabb, Result};
 
 /// Distance of a neighbor in metres along each axis; rounded to whole voxels, at least one.
@@ -21,6 +21,8 @@ pub(crate) struct MovingFinder<'a> {
     /// Number of points from which on a scan is examined in several parts, to bound the memory for its voxels.
     points_at_a_time: u64,
     region: Option<Aabb>,
+    /// Tiles outside of which hits are ignored.
+    tiles: Option<TileBox>,
     /// Things that stayed, if they are not moving.
     stays: Option<&'a Stays>,
     stop: &'a Stop,
@@ -30,12 +32,24 @@ impl<'a> MovingFinder<'a> {
     pub(crate) fn new(maps: BothOrders<'a>, folder: &'a Path, points_at_a_time: u64, stop: &'a Stop) -> Self {
         let grid = maps.forward.grid();
         let radius = (RADIUS_M / grid.resolution_m()).round().clamp(1.0, f64::from(MAX_RADIUS)) as i32;
-        Self { maps, folder, grid, radius, points_at_a_time, region: None, stays: None, stop }
+        Self { maps, folder, grid, radius, points_at_a_time, region: None, tiles: None, stays: None, stop }
     }
 
     /// Sets the box outside of which no point is marked, and the things that are not moving because they stayed.
     pub(crate) fn with(self, region: Option<Aabb>, stays: Option<&'a Stays>) -> Self {
         Self { region, stays, ..self }
+    }
+
+    /// # Errors
+    ///
+    /// A request to stop.
+    pub(crate) fn check_stop(&self) -> Result<()> {
+        self.stop.check()
+    }
+
+    /// Ignores hits outside of tiles of the map.
+    pub(crate) fn within(self, tiles: TileBox) -> Self {
+        Self { tiles: Some(tiles), ..self }
     }
 
     /// Returns the marks of a scan. Its own marks are ignored.
@@ -88,7 +102,8 @@ impl<'a> MovingFinder<'a> {
     }
 
     fn hits_of<'s>(&'s self, scan: &'s KeptScan, margin: i32) -> Result<ScanHits<'s>> {
-        let reader = HitReader { scan, grid: self.grid, region: self.region, stop: self.stop };
+        let Self { grid, region, tiles, stop, .. } = *self;
+        let reader = HitReader { scan, grid, region, tiles, stop };
         ScanHits::of(reader, margin, self.points_at_a_time, self.folder)
     }
 

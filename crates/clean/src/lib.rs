@@ -21,10 +21,15 @@ mod neighborhood;
 mod scan_hits;
 mod scan_map;
 mod search;
+mod search_parts;
 mod seen_through;
 mod stays;
 mod temporary_map;
 mod undo;
 
 pub use clean::{Clean, Cleaned, Phase, clean};
-pub use undo::undo;
+pub use scan_map::Order;
+pub use search_parts::{
+    AllMarks, FoundMarks, SearchMaps, clean_found, count_column, map_column, search_columns,
+};
+pub use undo::{undo, unmarked};

@@ -3,7 +3,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 use voxtile::mapper::KeptScan;
 use voxtile::scan::{ScanPoints, Stop, is_hit};
-use voxtile::space::{Grid, Point, VoxelIndex};
+use voxtile::space::{Grid, Point, TileBox, VoxelIndex};
 use voxtile::{Aabb, Error, Result};
 use voxtile_scratch::ScratchFile;
 
@@ -52,6 +52,8 @@ pub(crate) struct HitReader<'a> {
     pub(crate) grid: Grid,
     /// Box outside of which no point may be marked.
     pub(crate) region: Option<Aabb>,
+    /// Tiles outside of which hits are ignored.
+    pub(crate) tiles: Option<TileBox>,
     pub(crate) stop: &'a Stop,
 }
 
@@ -65,6 +67,7 @@ impl HitReader<'_> {
             for &point in points {
                 if is_hit(rays, origin, point)
                     && let Some(voxel) = self.grid.voxel_of(point)
+                    && self.tiles.is_none_or(|tiles| tiles.contains(self.grid.tile_of_voxel(voxel)))
                 {
                     let may_move = self.region.is_none_or(|region| region.contains(point));
                     take(Hit { voxel, number, may_move })?;

@@ -13,7 +13,7 @@ pub(crate) type ScanMap = StagedMap<OutOfCoreTileMapper>;
 
 /// Order in which scans are mapped: the last ones decide whether a voxel is free.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Order {
+pub enum Order {
     /// As in the map itself.
     Forward,
     /// The map calls a voxel free that was seen through before something came.
@@ -67,13 +67,16 @@ pub(crate) fn scan_map(
 }
 
 /// Tiles are most of the memory of a record.
-fn without_tiles_and_marks(record: KeptRecord) -> KeptRecord {
+pub(crate) fn without_tiles_and_marks(record: KeptRecord) -> KeptRecord {
     KeptRecord { tiles: Vec::new(), moving: None, ..record }
 }
 
-fn insert(mapper: &mut OutOfCoreTileMapper, scans: &KeptScans, record: KeptRecord) -> Result<()> {
+/// Inserts a scan, into the region of the map.
+pub(crate) fn insert(mapper: &mut OutOfCoreTileMapper, scans: &KeptScans, record: KeptRecord) -> Result<()> {
     let scan = scans.open(record)?;
-    mapper.set_rays(*scan.rays())?;
+    let mut rays = *scan.rays();
+    rays.region = mapper.config().rays.region;
+    mapper.set_rays(rays)?;
     mapper.insert_points(&scan)?;
     Ok(())
 }

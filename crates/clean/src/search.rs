@@ -5,8 +5,9 @@ use crate::scan_map::{Order, scan_map};
 use crate::seen_through::BothOrders;
 use crate::stays::{StayCounter, Stays};
 use rayon::prelude::*;
+use std::ops::RangeInclusive;
 use voxtile::mapper::{KeptScan, KeptScans, KeptSummary};
-use voxtile::scan::{ScanPoints, Stop};
+use voxtile::scan::{MovingMarks, ScanPoints, Stop};
 use voxtile::{Aabb, MapPath, MapReader, MemoryLimit, Queries, Result};
 
 /// Memory in bytes if there is no limit in bytes.
@@ -64,28 +65,13 @@ impl Search {
         let stays = stays.transpose()?;
         let finder = finder.with(self.region, stays.as_ref());
         let mut marks = MarksFile::in_folder(reader.folder())?;
-        let (mut points, mut moving_points) = (0, 0);
-        let (mut done, mut kept) = (0, reader.kept_scans()?);
-        loop {
-            self.stop.check()?;
-            progress(Phase::Finding, done, all);
-            let batch = next_batch(&mut kept)?;
-            if batch.is_empty() {
-                break;
-            }
-            let of_batch: Result<Vec<_>> = batch.par_iter().map(|scan| finder.marks_of(scan)).collect();
-            for (scan, of_scan) in batch.iter().zip(of_batch?) {
-                (points, moving_points) = (points + of_scan.points(), moving_points + of_scan.marked());
-                let is_same = match scan.moving() {
-                    Some(before) => *before == of_scan,
-                    None => of_scan.marked() == 0 && !scan.record().has_lost_marks(),
-                };
-                if !is_same {
-                    marks.push(scan.number(), &of_scan)?;
-                }
-            }
-            done += batch.len() as u64;
-        }
+        let (points, moving_points) = find_in(
+            &reader,
+            &finder,
+            0..=u64::MAX,
+            |number, of_scan| marks.push(number, of_scan),
+            |done| progress(Phase::Finding, done, all),
+        )?;
         Ok(Found { scans, marks, points, moving_points })
     }
 
@@ -109,26 +95,67 @@ impl Search {
     }
 }
 
+/// Searches the scans with these numbers. `take` receives the marks of those whose marks change, `progress` the number
+/// of scans done. Returns the numbers of points and of moving points.
+pub(crate) fn find_in(
+    map: &MapReader,
+    finder: &MovingFinder<'_>,
+    numbers: RangeInclusive<u64>,
+    mut take: impl FnMut(u64, &MovingMarks) -> Result<()>,
+    mut progress: impl FnMut(u64),
+) -> Result<(u64, u64)> {
+    let (mut points, mut moving_points, mut done) = (0, 0, 0);
+    let mut kept = map.kept_scans()?;
+    loop {
+        finder.check_stop()?;
+        progress(done);
+        let batch = next_batch(&mut kept, &numbers)?;
+        if batch.is_empty() {
+            return Ok((points, moving_points));
+        }
+        let of_batch: Result<Vec<_>> = batch.par_iter().map(|scan| finder.marks_of(scan)).collect();
+        for (scan, of_scan) in batch.iter().zip(of_batch?) {
+            (points, moving_points) = (points + of_scan.points(), moving_points + of_scan.marked());
+            let is_same = match scan.moving() {
+                Some(before) => *before == of_scan,
+                None => of_scan.marked() == 0 && !scan.record().has_lost_marks(),
+            };
+            if !is_same {
+                take(scan.number(), &of_scan)?;
+            }
+        }
+        done += batch.len() as u64;
+    }
+}
+
 /// Returns the next scans, to be examined at the same time: at most one per thread.
-fn next_batch(kept: &mut KeptScans) -> Result<Vec<KeptScan>> {
-    kept.take(rayon::current_num_threads()).collect()
+fn next_batch(kept: &mut KeptScans, numbers: &RangeInclusive<u64>) -> Result<Vec<KeptScan>> {
+    let mut batch = Vec::new();
+    while batch.len() < rayon::current_num_threads()
+        && let Some(record) = kept.next_record()?
+    {
+        if numbers.contains(&record.number) {
+            batch.push(kept.open(record)?);
+        }
+    }
+    Ok(batch)
 }
 
 /// Shares of the memory limit.
 #[derive(Clone, Copy, Debug)]
-struct MemoryShares {
+pub(crate) struct MemoryShares {
     /// Tiles of the map.
-    tiles_bytes: usize,
+    pub(crate) tiles_bytes: usize,
     /// Each temporary map of the scans.
-    map_bytes: usize,
+    pub(crate) map_bytes: usize,
     /// Counts of scans.
-    counts_bytes: usize,
+    pub(crate) counts_bytes: usize,
     /// Voxels of the scans that are examined at the same time.
     scans_bytes: usize,
 }
 
 impl MemoryShares {
-    fn of(memory: MemoryLimit, has_counts: bool) -> Self {
+    pub(crate) fn of(memory: MemoryLimit, has_counts: bool) -> Self {
         let bytes = match memory {
             MemoryLimit::Bytes(bytes) => bytes,
             _ => DEFAULT_BYTES,
@@ -140,7 +167,7 @@ impl MemoryShares {
     }
 
     /// Returns the number of points of a scan that are examined at the same time.
-    fn points_at_a_time(&self) -> u64 {
+    pub(crate) fn points_at_a_time(&self) -> u64 {
         let scans = rayon::current_num_threads();
         (self.scans_bytes / BYTES_PER_POINT / scans.max(1)).max(1) as u64
     }

@@ -1,7 +1,7 @@
 use crate::clean::{Cleaned, Phase};
 use rustc_hash::FxHashMap;
 use voxtile::mapper::KeptSummary;
-use voxtile::operations::{Replay, mark_moving};
+use voxtile::operations::{NewMarks, Replay, mark_moving};
 use voxtile::scan::MovingMarks;
 use voxtile::{MapPath, Result};
 
@@ -17,15 +17,20 @@ pub fn undo(
     mut progress: impl FnMut(Phase, u64, u64),
 ) -> Result<Cleaned> {
     let scans = KeptSummary::read(map)?;
-    let marked = scans.scans().iter().filter(|scan| scan.moving_points > 0);
-    let counts: FxHashMap<u64, u64> = marked.clone().map(|scan| (scan.number, scan.points)).collect();
-    let numbers: Vec<u64> = counts.keys().copied().collect();
-    let none = move |number: u64| {
-        let points = counts.get(&number).copied().unwrap_or_default();
-        Ok(MovingMarks::none(points))
-    };
-    let points = scans.scans().iter().map(|scan| scan.points).sum();
-    let points_changed = marked.map(|scan| scan.moving_points).sum();
-    let replayed = mark_moving(&scans, numbers, none, how, |done, all| progress(Phase::Undoing, done, all))?;
+    let (marks, points) = (unmarked(&scans), scans.scans().iter().map(|scan| scan.points).sum());
+    let points_changed = scans.scans().iter().map(|scan| scan.moving_points).sum();
+    let numbers = marks.numbers().to_vec();
+    let of_scan = move |number| marks.of_scan(number);
+    let replayed =
+        mark_moving(&scans, numbers, of_scan, how, |done, all| progress(Phase::Undoing, done, all))?;
     Ok(Cleaned { replayed, points, points_changed })
+}
+
+/// Returns marks without a marked point for all scans that have marks.
+pub fn unmarked(scans: &KeptSummary) -> NewMarks {
+    let marked = scans.scans().iter().filter(|scan| scan.moving_points > 0);
+    let counts: FxHashMap<u64, u64> = marked.map(|scan| (scan.number, scan.points)).collect();
+    let numbers: Vec<u64> = counts.keys().copied().collect();
+    let none = move |number: u64| Ok(MovingMarks::none(counts.get(&number).copied().unwrap_or_default()));
+    NewMarks::new(numbers, none)
 }

@@ -4,13 +4,16 @@ use std::path::Path;
 use tempfile::TempDir;
 use testkit::reference_map::{ReferenceMap, voxels_of};
 use voxtile::mapper::KeptSummary;
-use voxtile::operations::{Replay, snapshot};
+use voxtile::operations::{Replay, ScanChange, join, replay_columns, replay_part, snapshot};
 use voxtile::scan::{Scan, ScanPoints, ScanRef, Stop};
 use voxtile::{
-    Aabb, Clearing, Error, MapConfig, MapQueries, MapReader, Mapper, MemoryLimit, OutOfCoreTileMapper, Pose,
-    SnapshotName,
+    Aabb, Clearing, Error, MapConfig, MapPath, MapQueries, MapReader, Mapper, MemoryLimit,
+    OutOfCoreTileMapper, Pose, SnapshotName, TileBox,
 };
-use voxtile_clean::{Clean, Cleaned, clean, undo};
+use voxtile_clean::{
+    AllMarks, Clean, Cleaned, FoundMarks, Order, SearchMaps, clean, clean_found, count_column, map_column,
+    search_columns, undo,
+};
 
 /// A corridor along x, 6 m wide, with floor and walls. Something of 0.5 x 0.5 x 1.7 m moves across it; another thing
 /// stands for the first half of the scans and leaves.
@@ -248,4 +251,88 @@ fn maps_without_kept_scans_and_scans_of_invalid_points_are_no_panic() {
         clean(folder.path().join("none"), &Clean::default(), |_, _, _| ()),
         Err(Error::NoMap { .. })
     ));
+}
+
+/// Cleans a map as several processes do.
+fn run_in_parts(map: &Path, how: &Clean, tiles: u32) -> Cleaned {
+    let work = map.with_added_extension("work");
+    std::fs::create_dir(&work).unwrap();
+    let columns = search_columns(map, tiles).unwrap();
+    let joined = |name: &str, make: &dyn Fn(TileBox, &Path)| {
+        let shards: Vec<_> =
+            columns.iter().enumerate().map(|(number, _)| work.join(format!("{name}-{number}"))).collect();
+        columns
+            .iter()
+            .zip(&shards)
+            .for_each(|(&column, shard)| make(TileBox::of_column(column, tiles), shard));
+        let shards: Vec<MapPath> = shards.into_iter().map(MapPath::from).collect();
+        join(&shards, work.join(name), |_, _| ()).unwrap();
+        MapPath::from(work.join(name))
+    };
+    let mapped = |name, order| {
+        joined(name, &|region, shard| map_column(map, order, region, shard, [7; 16], &how.replay).unwrap())
+    };
+    let scans = KeptSummary::read(map).unwrap();
+    let has_marks = scans.scans().iter().any(|scan| scan.moving_points > 0);
+    let mut maps = SearchMaps {
+        reversed: mapped("reversed", Order::Reverse),
+        unmarked: has_marks.then(|| mapped("unmarked", Order::Forward)),
+        counts: None,
+    };
+    if how.parked_scans.is_some() {
+        let count = |region, shard: &Path| {
+            count_column(map, &maps, region, shard, [8; 16], &how.replay).unwrap();
+        };
+        let counts = joined("counts", &count);
+        maps.counts = Some(counts);
+    }
+    let search = |numbers: std::ops::RangeInclusive<u64>| {
+        let file = work.join(format!("{}.marks", numbers.start()));
+        let found = FoundMarks::search(map, &maps, how, numbers, &file).unwrap();
+        (file, found)
+    };
+    let found = vec![search(1..=3), search(4..=4), search(5..=90)];
+    let refused = AllMarks::of(&scans, map, &found[1..]).unwrap_err();
+    assert!(refused.to_string().contains("scan 1 was not searched"), "{refused}");
+    let all = AllMarks::of(&scans, map, &found).unwrap();
+    let change = ScanChange::Mark(all.new_marks());
+    let columns = replay_columns(&scans, &change, &how.replay, tiles).unwrap();
+    let parts = columns.into_iter().enumerate().map(|(number, column)| {
+        let shard = work.join(format!("part-{number}"));
+        let region = TileBox::of_column(column, tiles);
+        let part = replay_part(&scans, &change, &how.replay, region, &shard, |_, _| ()).unwrap();
+        (shard.exists().then(|| MapPath::from(shard)), part)
+    });
+    let parts: Vec<_> = parts.collect();
+    let cleaned = clean_found(&scans, &all, &how.replay.clone().with_parts(parts)).unwrap();
+    std::fs::remove_dir_all(work).unwrap();
+    cleaned
+}
+
+#[test]
+fn parts_of_several_processes_make_the_map_of_one() {
+    let (folder, corridor) = (TempDir::new().unwrap(), Corridor { scans: 12 });
+    let [one, other] = ["one", "other"].map(|name| folder.path().join(name));
+    corridor.build(&one);
+    corridor.build(&other);
+    let east = Aabb { min: [4.0, -9.0, -9.0], max: [9.0; 3] };
+    let options = [
+        (Clean::default(), 2),
+        (Clean::default().with_parked_scans(4), 3),
+        (Clean::default().with_region(east), 1),
+        (Clean::default().with_parked_scans(1), 64),
+    ];
+    let least = MemoryLimit::min_bytes(&Corridor::config().grid);
+    for (number, (how, tiles)) in options.into_iter().enumerate() {
+        let wanted = run(&one, &how);
+        let replay = Replay::default().with_memory(MemoryLimit::Bytes([least, 64 << 20][number % 2]));
+        let found = run_in_parts(
+            &other,
+            &Clean::new(replay).with_region(how.region).with_parked_scans(how.parked_scans),
+            tiles,
+        );
+        assert_eq!((found.points, found.points_changed), (wanted.points, wanted.points_changed), "{number}");
+        assert!(marks(&one) == marks(&other), "{number}");
+        assert_eq!(digest(&one), digest(&other), "{number}");
+    }
 }

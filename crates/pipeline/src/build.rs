@@ -145,7 +145,8 @@ fn build_input(
 
     if options.piece_of.is_some() && mapper.config().keeps_scans {
         // A shard numbers the scans of the whole build.
-        mapper.skip_scans(options.read.selection.first.saturating_sub(mapper.scan_number()));
+        let before = options.scans_before.saturating_add(options.read.selection.first);
+        mapper.skip_scans(before.saturating_sub(mapper.scan_number()));
     }
     if options.when_behind != WhenBehind::Wait {
         ingest.read_ahead(ScanQueue::new(options.when_behind, ScanQueue::MAX_SCANS));

@@ -83,6 +83,8 @@ pub struct BuildOptions {
     /// ID of the shard to build. A shard is not durable: after a crash it must be built again, and
     /// [`operations::move_shard`](voxtile::operations::move_shard()) makes it durable.
     pub piece_of: Option<[u8; 16]>,
+    /// Number of the map's scans before those of the input, if the shard is part of an update.
+    pub scans_before: u64,
 }
 
 impl BuildOptions {
@@ -119,6 +121,7 @@ impl BuildOptions {
             when_behind: WhenBehind::Wait,
             octree: OctreeConfig::default(),
             piece_of: None,
+            scans_before: 0,
         }
     }
 }

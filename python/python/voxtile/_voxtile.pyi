@@ -22,6 +22,7 @@ __all__ = [
     "call_build",
     "call_export",
     "call_export_scans",
+    "check_replay",
     "class_style",
     "clean",
     "clear",
@@ -40,21 +41,25 @@ __all__ = [
     "import_octree",
     "join",
     "join_parts",
-    "join_remap",
+    "join_replay",
+    "map_for_search",
     "merge",
     "move_shard",
     "open_scans",
     "remap",
     "remap_as",
-    "remap_columns",
-    "remap_part",
     "remove_points",
     "remove_scans",
     "scan_digest",
     "repair",
+    "replay_columns",
+    "replay_part",
     "revert",
     "run_command",
     "scan_reaches",
+    "search_columns",
+    "search_moving",
+    "search_points",
     "snapshots",
     "verify",
     "wait_for_all",
@@ -345,6 +350,7 @@ def call_build(
     progress: _Progress | None = None,
     *,
     shard_of: str | None = None,
+    scans_before: int = 0,
 ) -> dict[str, Any]: ...
 def call_export(
     map: _Path, output: _Path, options: Mapping[str, Any], progress: _Progress | None = None
@@ -369,35 +375,52 @@ def remap(
     memory: int | str | None = None,
     progress: _Progress | None = None,
 ) -> dict[str, Any]: ...
-def remap_columns(
+def replay_columns(map: _Path, change: dict[str, Any], tiles: int) -> list[tuple[int, int]]: ...
+def replay_part(
     map: _Path,
-    poses: Mapping[int, _Pose] | Iterable[_Pose],
-    tiles: int,
-    *,
-    interpolate: bool = False,
-    tolerance: tuple[float, float] | None = None,
-) -> list[tuple[int, int]]: ...
-def remap_part(
-    map: _Path,
-    poses: Mapping[int, _Pose] | Iterable[_Pose],
+    change: dict[str, Any],
     column: tuple[int, int],
     tiles: int,
     output: _Path,
     *,
-    interpolate: bool = False,
-    tolerance: tuple[float, float] | None = None,
     memory: int | str | None = None,
 ) -> str: ...
-def join_remap(
+def join_replay(
     map: _Path,
-    poses: Mapping[int, _Pose] | Iterable[_Pose],
+    change: dict[str, Any],
     parts: Sequence[tuple[_Path | None, str]],
     *,
-    interpolate: bool = False,
-    tolerance: tuple[float, float] | None = None,
     keep_as: str | None = None,
+    from_snapshots: bool = False,
     memory: int | str | None = None,
 ) -> dict[str, Any]: ...
+def search_points(map: _Path, region: ArrayLike, first: int, last: int) -> str: ...
+def check_replay(
+    map: _Path, *, keep_as: str | None = None, memory: int | str | None = None
+) -> tuple[int, int, bool]: ...
+def search_columns(map: _Path, tiles: int) -> list[tuple[int, int]]: ...
+def map_for_search(
+    map: _Path,
+    kind: Literal["reversed", "unmarked", "counts"],
+    column: tuple[int, int],
+    tiles: int,
+    output: _Path,
+    *,
+    shard_of: str,
+    maps: tuple[_Path, _Path | None, _Path | None] | None = None,
+    memory: int | str | None = None,
+) -> None: ...
+def search_moving(
+    map: _Path,
+    maps: tuple[_Path, _Path | None, _Path | None],
+    first: int,
+    last: int,
+    output: _Path,
+    *,
+    region: ArrayLike | None = None,
+    parked_scans: int | None = None,
+    memory: int | str | None = None,
+) -> str: ...
 def class_style(number: int, /) -> tuple[str, tuple[int, int, int]]: ...
 def clean(
     map: _Path,
@@ -489,7 +512,13 @@ def move_shard(
 def scan_digest(map: _MapOrSnapshot) -> str: ...
 def join(shards: Sequence[_Path], output: _Path, *, progress: _Progress | None = None) -> dict[str, Any]: ...
 def replace_tiles(
-    map: _Path, parts: Sequence[_Path], *, of_flush: int, scans: int, progress: _Progress | None = None
+    map: _Path,
+    parts: Sequence[_Path],
+    *,
+    of_flush: int,
+    scans: int,
+    input: str | None = None,
+    progress: _Progress | None = None,
 ) -> dict[str, Any]: ...
 def default_tile_size(resolution: float) -> float: ...
 def describe(map: _MapOrSnapshot) -> dict[str, Any]: ...

@@ -144,9 +144,13 @@ def reaches(
     return scan_reaches(path, options, max_range=max_range, no_return_range=clear_no_return)
 
 
-def build_shard(path: _Path, output: _Path, map_id: str, **options: Unpack[BuildOptions]) -> dict[str, Any]:
-    """Builds a shard of the map with this id, as ``build`` does. It is durable after ``move_shard``."""
-    return call_build(path, output, options, shard_of=map_id)
+def build_shard(
+    path: _Path, output: _Path, map_id: str, scans_before: int = 0, **options: Unpack[BuildOptions]
+) -> dict[str, Any]:
+    """Builds a shard of the map with this id, as ``build`` does. It is durable after ``move_shard``. For an update,
+    ``scans_before`` is the number of scans of the map.
+    """
+    return call_build(path, output, options, shard_of=map_id, scans_before=scans_before)
 
 
 def build(

@@ -1,9 +1,8 @@
 use super::replay::{Replay, Replayed, replay};
-use super::revision::{Change, MarkSource};
+use super::scan_change::NewMarks;
 use crate::error::Result;
 use crate::mapper::KeptSummary;
 use crate::scan::MovingMarks;
-use std::sync::Arc;
 
 /// Marks points of kept scans as hits of something that was moving. A marked point is no hit and protects no voxel from
 /// misses; the misses of its ray stay. Affected tiles are replayed, and one commit changes tiles and marks.
@@ -26,7 +25,5 @@ pub fn mark_moving(
     progress: impl FnMut(u64, u64),
 ) -> Result<Replayed> {
     scans.check_keeps_all()?;
-    let marks = MarkSource(Arc::new(marks));
-    let changes = numbers.into_iter().map(|number| (number, Change::Mark(marks.clone()))).collect();
-    replay(scans, changes, how, progress)
+    replay(scans, NewMarks::new(numbers, marks).changes(), how, progress)
 }

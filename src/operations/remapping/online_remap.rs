@@ -49,20 +49,23 @@ impl OnlineRemap {
     ///
     /// # Errors
     ///
-    /// As for [`remap`](super::remap()); a dry run, which only `remap` supports; another remap of the same map.
+    /// As for [`remap`](super::remap()); a dry run or finished parts, which only `remap` supports; another remap of the same map.
     pub fn begin(scans: &KeptSummary, poses: &NewPoses, how: &Remap) -> Result<Self> {
         let (disk, folder) = scans.place();
         if how.replay.is_dry_run {
             return Err(Error::argument("is_dry_run", "not supported online; use `remap` for a dry run"));
         }
+        if how.replay.parts.is_some() {
+            return Err(Error::argument("parts", "not supported online; use `remap`"));
+        }
         let threads = rayon::ThreadPoolBuilder::new().start_handler(|_| lower_priority()).build();
         let threads =
             threads.map_err(|error| Error::io(folder, "start threads", std::io::Error::other(error)))?;
-        let (remapped, changes) = Remapped::by_poses(scans, poses, how)?;
+        let (remapped, changes) = Remapped::by_poses(scans, poses, how.tolerance)?;
         let mut revision = Revision::new(scans, &how.replay, changes)?;
         let store = TileStore::open_read_only(disk.clone(), folder)?;
         check_catalog(&store, scans.catalog())?;
-        let touched = threads.install(|| revision.look(&store))?;
+        let touched = threads.install(|| revision.look(&store, None))?;
         let is_needed = revision.counts.scans_changed > 0;
         let begin = || ShadowMapper::begin(&store, touched.config.clone(), how.replay.stop.clone());
         let side = is_needed.then(begin).transpose()?;

@@ -1,6 +1,6 @@
+use super::change::{Change, Changes};
 use super::new_poses::{NewPoses, check_can_move};
 use super::replay::{Replay, Replayed, replay};
-use super::revision::{Change, Changes};
 use crate::error::{Error, Result};
 use crate::mapper::{KeptScanHead, KeptSummary, NewPose};
 use crate::scan::Sweep;
@@ -79,15 +79,19 @@ pub fn remap(
     how: &Remap,
     progress: impl FnMut(u64, u64),
 ) -> Result<Remapped> {
-    let (mut remapped, changes) = Remapped::by_poses(scans, poses, how)?;
+    let (mut remapped, changes) = Remapped::by_poses(scans, poses, how.tolerance)?;
     remapped.mapped = replay(scans, changes, &how.replay, progress)?;
     Ok(remapped)
 }
 
 impl Remapped {
     /// Returns the changes of scans by new poses, and how far they move.
-    pub(super) fn by_poses(scans: &KeptSummary, poses: &NewPoses, how: &Remap) -> Result<(Self, Changes)> {
-        if let Some((moved_m, turned)) = how.tolerance
+    pub(super) fn by_poses(
+        scans: &KeptSummary,
+        poses: &NewPoses,
+        tolerance: Option<(f64, f64)>,
+    ) -> Result<(Self, Changes)> {
+        if let Some((moved_m, turned)) = tolerance
             && !(moved_m >= 0.0 && turned >= 0.0)
         {
             return Err(Error::argument(
@@ -100,7 +104,7 @@ impl Remapped {
         let poses = poses.by_number(scans)?;
         for scan in scans.scans() {
             if let Some(pose) = poses.get(&scan.number)
-                && remapped.moves(scan, scans.sweep(scan.number), pose, how.tolerance)?
+                && remapped.moves(scan, scans.sweep(scan.number), pose, tolerance)?
             {
                 changes.insert(scan.number, Change::Move(pose.clone()));
             }

@@ -1,14 +1,11 @@
 use super::completion::complete_earlier;
-use super::filtered_scan::FilteredScan;
+use super::points_in_box::{PointsInBox, check_box};
 use super::replay::{Replay, Replayed, replay};
-use super::revision::{Change, Changes};
-use crate::error::{Error, Result};
-use crate::mapper::MapReader;
-use crate::scan::ScanPoints;
+use crate::error::Result;
+use crate::mapper::KeptSummary;
 use crate::space::Aabb;
 use crate::store::MapPath;
 use serde::Serialize;
-use std::path::Path;
 
 /// Result of [`remove_points`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
@@ -37,36 +34,29 @@ pub fn remove_points(
     progress: impl FnMut(u64, u64),
 ) -> Result<PointsRemoved> {
     let (disk, folder) = map.into().into_parts();
-    check_region(region, &folder)?;
-    let (mut changes, mut points_removed) = (Changes::default(), 0);
-    let summary = {
-        let reader = MapReader::open(MapPath::on(disk.clone(), &folder), 0)?;
-        let summary = reader.kept_summary()?;
-        summary.check_keeps_all()?;
-        for scan in reader.kept_scans()? {
-            how.stop.check()?;
-            let scan = scan?;
-            let points = FilteredScan::new(&scan, *region, true)?.len() as u64;
-            if points > 0 {
-                points_removed += points;
-                changes.insert(scan.number(), Change::Filter(*region));
-            }
-        }
-        summary
-    };
-    let mapped = replay(&summary, changes, how, progress)?;
-    if mapped.scans_changed == 0 && !how.is_dry_run {
-        // Remove the files of an earlier call that may have been killed after its commit.
-        complete_earlier(disk, &folder)?;
-    }
-    Ok(PointsRemoved { mapped, points_removed })
+    check_box(region, &folder)?;
+    let scans = KeptSummary::read(MapPath::on(disk, folder))?;
+    let found = PointsInBox::search(&scans, region, 0..=u64::MAX, &how.stop)?;
+    remove_found_points(&scans, &found, how, progress)
 }
 
-fn check_region(region: &Aabb, map: &Path) -> Result<()> {
-    let is_box = (0..3).all(|axis| region.min[axis] < region.max[axis]);
-    if is_box {
-        return Ok(());
+/// Like [`remove_points`], with the points that searches of all scans have found.
+///
+/// # Errors
+///
+/// As for [`remove_points`], and a scan that was not searched.
+pub fn remove_found_points(
+    scans: &KeptSummary,
+    found: &PointsInBox,
+    how: &Replay,
+    progress: impl FnMut(u64, u64),
+) -> Result<PointsRemoved> {
+    scans.check_keeps_all()?;
+    let mapped = replay(scans, found.changes(scans)?, how, progress)?;
+    if mapped.scans_changed == 0 && !how.is_dry_run {
+        // Remove the files of an earlier call that may have been killed after its commit.
+        let (disk, folder) = scans.place();
+        complete_earlier(disk, folder)?;
     }
-    let reason = format!("not a box (map {}); give the lower corner first", map.display());
-    Err(Error::argument("region", reason))
+    Ok(PointsRemoved { mapped, points_removed: found.points() })
 }

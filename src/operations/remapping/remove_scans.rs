@@ -1,6 +1,6 @@
+use super::change::{Change, Changes};
 use super::completion::complete_earlier;
 use super::replay::{Replay, Replayed, replay};
-use super::revision::{Change, Changes};
 use crate::error::{Error, Result};
 use crate::mapper::{KeptScanHead, KeptSummary, MapReader, MapView};
 use crate::operations::snapshot::delete_snapshot;
@@ -162,13 +162,13 @@ impl ScansRemoved {
 }
 
 /// Selection with the numbers of inputs resolved, for a map or one of its snapshots.
-enum Selection {
+pub(super) enum Selection {
     Numbers(Vec<(u64, u64)>),
     Time(i64, i64),
 }
 
 impl Selection {
-    fn of(scans: &ScanSelection, reader: &MapReader) -> Self {
+    pub(super) fn of(scans: &ScanSelection, reader: &MapReader) -> Self {
         match scans {
             ScanSelection::Numbers(first, last) => Self::Numbers(vec![(*first, *last)]),
             ScanSelection::Time(first, last) => Self::Time(*first, *last),
@@ -187,7 +187,7 @@ impl Selection {
         }
     }
 
-    fn removals(&self, scans: &KeptSummary) -> Changes {
+    pub(super) fn removals(&self, scans: &KeptSummary) -> Changes {
         let selected = scans.scans().iter().filter(|scan| self.has(scan));
         selected.map(|scan| (scan.number, Change::Remove)).collect()
     }

@@ -1,11 +1,14 @@
+use super::change::Changes;
 use super::completion::{complete, remove_second_map};
-use super::revision::{Changes, Revision};
+use super::finished_parts::FinishedParts;
+use super::replay_part::ReplayPart;
+use super::revision::Revision;
 use crate::config::{MapConfig, MemoryLimit};
 use crate::error::{Error, Result};
 use crate::mapper::KeptSummary;
 use crate::persistence::config_from;
 use crate::scan::Stop;
-use crate::store::{Disk, SnapshotName, TileStore};
+use crate::store::{Disk, MapPath, SnapshotName, TileStore};
 use serde::Serialize;
 use std::path::Path;
 use std::sync::Arc;
@@ -23,6 +26,9 @@ pub struct Replay {
     pub is_dry_run: bool,
     /// Request to stop. After a stop the map is unchanged.
     pub stop: Stop,
+    /// Finished parts of all columns ([`replay_part`](super::replay_part()), each with its shard if there is one. They
+    /// are committed; the shards are unchanged. Default: this process replays the affected tiles.
+    pub parts: Option<Vec<(Option<MapPath>, ReplayPart)>>,
 }
 
 impl Replay {
@@ -44,6 +50,11 @@ impl Replay {
     /// Sets the request to stop.
     pub fn with_stop(self, stop: Stop) -> Self {
         Self { stop, ..self }
+    }
+
+    /// Sets finished parts, which the operation then commits: with the same change, the result is that of one process.
+    pub fn with_parts(self, parts: impl Into<Option<Vec<(Option<MapPath>, ReplayPart)>>>) -> Self {
+        Self { parts: parts.into(), ..self }
     }
 
     /// Checks what a replay needs, whatever the changes. Call this before a long search for changes.
@@ -111,13 +122,26 @@ pub(super) fn replay(
         // Checked before the search for affected tiles, which can take long.
         store.snapshots().check_catalogs()?;
     }
-    let touched = revision.look(&store)?;
+    let (touched, parts) = match &how.parts {
+        Some(_) if how.is_dry_run => {
+            return Err(Error::argument("parts", "a dry run replays nothing, so it has no parts"));
+        }
+        Some(_) if revision.counts.scans_changed == 0 => {
+            revision.counts.tiles = store.tiles().count() as u64;
+            return Ok(revision.counts);
+        }
+        Some(parts) => {
+            let (parts, touched) = FinishedParts::of(parts, &store, &mut revision)?;
+            (touched, Some(parts))
+        }
+        None => (revision.look(&store, None)?, None),
+    };
     if how.is_dry_run || revision.counts.scans_changed == 0 {
         return Ok(revision.counts);
     }
     create_snapshot(&mut store, how)?;
-    let (counts, released) =
-        clean_up_after_error(disk.clone(), folder, revision.map(store, touched, &mut progress))?;
+    let mapped = revision.map(store, touched, parts, &mut progress);
+    let (counts, released) = clean_up_after_error(disk.clone(), folder, mapped)?;
     let second = if takes_points { remove_second_map(disk.clone(), folder) } else { Ok(()) };
     match released {
         // The removed points must not remain in files: `complete` opens the map again and retries.

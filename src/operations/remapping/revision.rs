@@ -1,74 +1,30 @@
+use super::change::{Change, Changes, rays_within, tiles_of_marks};
 use super::completion::release;
 use super::filtered_scan::FilteredScan;
+use super::finished_parts::FinishedParts;
 use super::replay::{Replay, Replayed};
 use crate::config::{GUARD_REACH, MapConfig};
-use crate::error::{Error, Result};
-use crate::mapper::{KeptScan, KeptSummary, NewPose, Remapper, TileFinder};
-use crate::scan::{ChunkMarks, MovingMarks, ScanPoints, ScanReport};
-use crate::space::{Aabb, Grid, TileBox, TileIndex, TileSelection};
+use crate::error::Result;
+use crate::mapper::{KeptScan, KeptSummary, Remapper, TileFinder};
+use crate::scan::ScanPoints;
+use crate::space::{TileBox, TileIndex, TileSelection};
 use crate::store::{CatalogEntry, Disk, KeptRecord, Layout, TileStore};
-use rustc_hash::{FxHashMap, FxHashSet};
+use rustc_hash::FxHashSet;
 use std::collections::BTreeSet;
-use std::fmt;
 use std::sync::Arc;
 use std::time::Instant;
 
-/// Change of a scan. Other scans are unchanged.
-#[derive(Clone, Debug)]
-pub(super) enum Change {
-    Move(NewPose),
-    Remove,
-    /// Removes the points in a box.
-    Filter(Aabb),
-    /// Marks other points as moving than before.
-    Mark(MarkSource),
-}
-
-pub(super) type Changes = FxHashMap<u64, Change>;
-
-/// Source of new marks of moving points, by the number of the scan.
-#[derive(Clone)]
-pub(super) struct MarkSource(pub(super) Arc<dyn Fn(u64) -> Result<MovingMarks> + Send + Sync>);
-
-impl fmt::Debug for MarkSource {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str("MarkSource")
-    }
-}
-
-impl MarkSource {
-    /// Returns the new marks of a scan.
-    ///
-    /// # Errors
-    ///
-    /// Errors of the source, and marks that do not match the points.
-    fn of(&self, scan: &KeptScan) -> Result<MovingMarks> {
-        let marks = (self.0)(scan.number())?;
-        match marks.points() == scan.record().points {
-            true => Ok(marks),
-            false => {
-                let (number, points) = (scan.number(), scan.record().points);
-                let reason = format!(
-                    "{} for the {points} points of scan {number}; one per point is needed",
-                    marks.points()
-                );
-                Err(Error::argument("marks", reason))
-            }
-        }
-    }
-}
-
 /// If more than one third of all updates belong to changed scans, all tiles are replayed: finding the affected tiles
 /// would cost more than it saves.
-pub(super) const PART_FOR_ALL: u64 = 3;
+const PART_FOR_ALL: u64 = 3;
 /// Maximum number of points of a kept scan in memory. Larger scans are read again when needed.
-pub(super) const MAX_POINTS_IN_MEMORY: u64 = 1 << 18;
+const MAX_POINTS_IN_MEMORY: u64 = 1 << 18;
 
 /// Change of scans, and its effects.
 pub(super) struct Revision {
     disk: Arc<dyn Disk>,
     how: Replay,
-    changes: Changes,
+    pub(super) changes: Changes,
     /// Segments of the archive that contain points to remove. Their other points are copied to new segments.
     segments: BTreeSet<u64>,
     /// Updates of the changed scans.
@@ -80,7 +36,7 @@ pub(super) struct Revision {
 pub(super) struct Touched {
     pub(super) config: MapConfig,
     /// `None` for all.
-    tiles: Option<FxHashSet<TileIndex>>,
+    pub(super) tiles: Option<FxHashSet<TileIndex>>,
 }
 
 impl Touched {
@@ -122,15 +78,19 @@ impl Revision {
         !self.segments.is_empty()
     }
 
-    /// Finds the tiles that the change affects.
-    pub(super) fn look(&mut self, store: &TileStore) -> Result<Touched> {
+    /// Returns whether so many scans change that all tiles are replayed.
+    pub(super) fn replays_all(&self) -> bool {
+        self.changed_updates > self.counts.updates / PART_FOR_ALL
+    }
+
+    /// Finds the tiles that the change affects; with a region, those of the region.
+    pub(super) fn look(&mut self, store: &TileStore, region: Option<TileBox>) -> Result<Touched> {
         let config = self.how.config_of(store)?;
         self.counts.tiles = store.tiles().count() as u64;
         let (began, mut looked_at) = (Instant::now(), 0);
-        let are_all = self.changed_updates > self.counts.updates / PART_FOR_ALL;
-        let tiles = match are_all {
+        let tiles = match self.replays_all() {
             true => None,
-            false => Some(self.tiles_of_changes(store, &config, &mut looked_at)?),
+            false => Some(self.tiles_of_changes(store, &config, region, &mut looked_at)?),
         };
         let touched = Touched { config, tiles };
         self.counts.tiles_mapped =
@@ -141,14 +101,32 @@ impl Revision {
         Ok(touched)
     }
 
-    /// Returns the tiles that changed scans touch before and after. Adds to `looked_at` the updates of the scans that
-    /// are traced to find these tiles.
+    /// Returns the tiles that finished parts replace as the affected ones; all if the change affects all.
+    pub(super) fn touched_by(
+        &mut self,
+        store: &TileStore,
+        replaced: FxHashSet<TileIndex>,
+    ) -> Result<Touched> {
+        self.counts.tiles = store.tiles().count() as u64;
+        let tiles = (!self.replays_all()).then_some(replaced);
+        Ok(Touched { config: self.how.config_of(store)?, tiles })
+    }
+
+    /// Returns the tiles of a region that changed scans touch before and after. Adds to `looked_at` the updates of the
+    /// scans that are traced to find these tiles.
     fn tiles_of_changes(
         &self,
         store: &TileStore,
         config: &MapConfig,
+        region: Option<TileBox>,
         looked_at: &mut u64,
     ) -> Result<FxHashSet<TileIndex>> {
+        let changes_hits =
+            self.changes.values().any(|change| matches!(change, Change::Filter(_) | Change::Mark(_)));
+        // With guarded clearing, a hit makes nearby misses weak, also in tiles that its ray did not pass.
+        let is_guarded = changes_hits && config.rays.clearing().guard().is_some();
+        let reach = if is_guarded { config.grid.tiles_within(GUARD_REACH) } else { 0 };
+        let around = region.map(|region| region.grown(reach));
         let mut tiles = FxHashSet::default();
         let mut finder = TileFinder::new(config, self.disk.clone(), self.how.stop.clone());
         let mut records = store.archive().records()?;
@@ -158,11 +136,12 @@ impl Revision {
             if let Change::Move(_) | Change::Remove = change {
                 tiles.extend(record.tiles.iter().copied());
             }
-            if matches!(change, Change::Remove) {
+            let Some(rays) = rays_within(&record.rays, around) else { continue };
+            if matches!(change, Change::Remove) || !change.may_reach(&record, &config.grid, around)? {
                 continue;
             }
             let scan = self.open(store.layout(), record)?;
-            let (rays, updates) = (*scan.rays(), scan.record().updates);
+            let updates = scan.record().updates;
             tiles.extend(match change {
                 Change::Move(pose) => {
                     finder.tiles_of(&scan.with_pose(pose.clone()), &rays, store.folder())?
@@ -181,17 +160,14 @@ impl Revision {
             });
             *looked_at += updates;
         }
-        let changes_hits =
-            self.changes.values().any(|change| matches!(change, Change::Filter(_) | Change::Mark(_)));
-        if changes_hits && config.rays.clearing().guard().is_some() {
-            // With guarded clearing, a hit makes nearby misses weak, also in tiles that its ray did not pass.
-            let reach = config.grid.tiles_within(GUARD_REACH);
+        if is_guarded {
             let changed: Vec<_> = tiles.iter().copied().collect();
             for tile in changed {
                 let near = TileBox::new(tile, tile).grown(reach).tiles();
                 tiles.extend(near.filter(|tile| store.tiles().contains(*tile)));
             }
         }
+        tiles.retain(|tile| region.is_none_or(|region| region.contains(*tile)));
         Ok(tiles)
     }
 
@@ -217,7 +193,7 @@ impl Revision {
         Ok(())
     }
 
-    fn open(&self, layout: &Layout, record: KeptRecord) -> Result<KeptScan> {
+    pub(super) fn open(&self, layout: &Layout, record: KeptRecord) -> Result<KeptScan> {
         KeptScan::open(&self.disk, layout, record, MAX_POINTS_IN_MEMORY)
     }
 
@@ -228,14 +204,14 @@ impl Revision {
         self.how.stop.check()
     }
 
-    /// Applies the change of a scan with `map`, which inserts its points into a selection of tiles or into all. Returns
-    /// its new entry. The changes may contain new poses only, no removals.
+    /// Applies the change of a scan with `map`, which inserts its points into a selection of tiles or into all, and
+    /// returns the number of updates and the changed tiles. Returns its new entry. The changes may contain new poses only, no removals.
     pub(super) fn apply_change(
         &mut self,
         layout: &Layout,
         record: KeptRecord,
         touched: &Touched,
-        map: impl FnOnce(&KeptScan, Option<&TileSelection>) -> Result<(ScanReport, Vec<TileIndex>)>,
+        map: impl FnOnce(&KeptScan, Option<&TileSelection>) -> Result<(u64, Vec<TileIndex>)>,
     ) -> Result<KeptRecord> {
         let pose = match self.changes.get(&record.number) {
             Some(Change::Move(pose)) => Some(pose.clone()),
@@ -253,11 +229,13 @@ impl Revision {
         self.map_points(scan.record().clone(), touched, is_moved, |selection| map(&scan, selection))
     }
 
-    /// Replays the affected tiles and commits. Also returns the result of removing files that are no longer needed.
+    /// Replays the affected tiles, or takes them from finished parts, and commits. Also returns the result of removing
+    /// files that are no longer needed.
     pub(super) fn map(
         mut self,
         store: TileStore,
         touched: Touched,
+        mut parts: Option<FinishedParts>,
         progress: &mut impl FnMut(u64, u64),
     ) -> Result<(Replayed, Result<()>)> {
         let layout = store.layout().clone();
@@ -275,21 +253,33 @@ impl Revision {
             progress(done, self.counts.scans);
             done += 1;
             let (number, change) = (record.number, self.changes.get(&record.number).cloned());
+            if let (Some(parts), Some(change)) = (&mut parts, &change) {
+                parts.check_has_all(&record, change, &touched.config.grid)?;
+            }
             if matches!(change, Some(Change::Remove)) {
                 remapper.put(&CatalogEntry::Removed(number, number))?;
                 continue;
             }
             have_poses_changed |= matches!(change, Some(Change::Move(_)));
             let mut record = *record;
-            if change.is_some() || touched.has_any_of(&record) {
-                let scan = self.open(&layout, record)?;
-                record = self.map_scan(&mut remapper, scan, change, &touched)?;
+            if change.is_some() || parts.is_none() && touched.has_any_of(&record) {
+                // Points that a part has mapped are only read to be written.
+                let most = if parts.is_some() { 0 } else { MAX_POINTS_IN_MEMORY };
+                let scan = KeptScan::open(&self.disk, &layout, record, most)?;
+                record = self.map_scan(&mut remapper, scan, change, &touched, parts.as_ref())?;
             } else {
                 self.copy_out(&mut remapper, &mut record)?;
+                if let (Some(parts), None) = (&parts, &touched.tiles) {
+                    record.updates = parts.of_scan(number).0;
+                }
             }
             remapper.put(&CatalogEntry::Kept(Box::new(record)))?;
         }
         progress(done, self.counts.scans);
+        if let Some(parts) = parts {
+            parts.link_into(&mut remapper)?;
+            parts.put_counts(&mut self.counts);
+        }
         let released = remapper.finish(have_poses_changed, release)?;
         Ok((self.counts, released))
     }
@@ -304,13 +294,14 @@ impl Revision {
         Ok(())
     }
 
-    /// Inserts a scan into the affected tiles. Returns its new record.
+    /// Inserts a scan into the affected tiles, unless a part has done so. Returns its new record.
     fn map_scan(
         &mut self,
         remapper: &mut Remapper,
         scan: KeptScan,
         change: Option<Change>,
         touched: &Touched,
+        parts: Option<&FinishedParts>,
     ) -> Result<KeptRecord> {
         let is_moved = matches!(change, Some(Change::Move(_)));
         let (mut record, mut scan) = (scan.record().clone(), scan);
@@ -330,10 +321,12 @@ impl Revision {
                     }
                     Some(Change::Mark(marks)) => {
                         let marks = marks.of(&scan)?;
-                        // Hits that return may be in tiles that the scan did not touch without them.
-                        record.tiles.extend(tiles_of_marks(&touched.config.grid, &scan, &marks)?);
-                        record.tiles.sort_unstable();
-                        record.tiles.dedup();
+                        if parts.is_none() {
+                            // Hits that return may be in tiles that the scan did not touch without them.
+                            record.tiles.extend(tiles_of_marks(&touched.config.grid, &scan, &marks)?);
+                            record.tiles.sort_unstable();
+                            record.tiles.dedup();
+                        }
                         record.moving = remapper.write_marks(&marks)?;
                         scan = scan.with_moving(marks);
                     }
@@ -343,7 +336,10 @@ impl Revision {
             }
         };
         let (number, rays) = (record.number, record.rays);
-        let map = |selection: Option<&TileSelection>| remapper.map(number, points, &rays, selection);
+        let map = |selection: Option<&TileSelection>| match parts {
+            Some(parts) => Ok(parts.of_scan(number)),
+            None => remapper.map(number, points, &rays, selection),
+        };
         self.map_points(record, touched, is_moved, map)
     }
 
@@ -353,17 +349,17 @@ impl Revision {
         mut record: KeptRecord,
         touched: &Touched,
         is_moved: bool,
-        map: impl FnOnce(Option<&TileSelection>) -> Result<(ScanReport, Vec<TileIndex>)>,
+        map: impl FnOnce(Option<&TileSelection>) -> Result<(u64, Vec<TileIndex>)>,
     ) -> Result<KeptRecord> {
         // All tiles of a moved scan are affected.
         let selection = touched.tiles.as_ref().filter(|_| !is_moved).map(|tiles| {
             record.tiles.iter().copied().filter(|tile| tiles.contains(tile)).collect::<TileSelection>()
         });
-        let (report, tiles) = map(selection.as_ref())?;
+        let (updates, tiles) = map(selection.as_ref())?;
         self.counts.scans_mapped += 1;
-        self.counts.updates_mapped += report.hits + report.misses;
+        self.counts.updates_mapped += updates;
         if selection.is_none() {
-            record.updates = report.hits + report.misses;
+            record.updates = updates;
         }
         record.tiles = match &touched.tiles {
             None => tiles,
@@ -382,20 +378,4 @@ impl Revision {
         };
         Ok(record)
     }
-}
-
-/// Returns the tiles of the points whose marks differ from those of the scan, in no order. They include all tiles in
-/// which the scan gains or loses hits. If the marks of the scan are lost, these are the tiles of all points.
-fn tiles_of_marks(grid: &Grid, scan: &KeptScan, new: &MovingMarks) -> Result<Vec<TileIndex>> {
-    let (mut old, mut new) = (ChunkMarks::from(scan.moving(), 0), ChunkMarks::from(Some(new), 0));
-    let mut tiles = FxHashSet::default();
-    let are_lost = scan.record().has_lost_marks();
-    scan.for_each_chunk(0..scan.len(), &mut |points, _| {
-        let (old, new) = (old.next(points.len()), new.next(points.len()));
-        let is_set = |marks: &[bool], number: usize| marks.get(number).is_some_and(|is_set| *is_set);
-        let differs = |number: &usize| are_lost || is_set(old, *number) != is_set(new, *number);
-        tiles.extend((0..points.len()).filter(differs).filter_map(|number| grid.tile_of(points[number])));
-        true
-    })?;
-    Ok(tiles.into_iter().collect())
 }

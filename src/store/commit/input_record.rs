@@ -45,7 +45,7 @@ pub struct InputContent {
     /// Fingerprint of the first scan with points; `None` if the first few scans have none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub begins_with: Option<String>,
-    /// Hash chain of the scans, 32 hexadecimal digits.
+    /// Hash chain of the scans, 32 hexadecimal digits; empty after an update in parts.
     pub scan_chain: String,
     /// Hash chain of the poses, 32 hexadecimal digits; empty after a remap with other poses.
     pub pose_chain: String,

@@ -24,4 +24,4 @@ pub use map::{
     open_or_create, replay, scans, snapshot_names,
 };
 pub use model::{Content, State};
-pub use scans::{Taken, new_poses};
+pub use scans::{Taken, new_marks, new_poses};

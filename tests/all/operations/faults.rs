@@ -75,8 +75,9 @@ fn make_local(disk: &FaultyDisk) -> Result<()> {
 /// Like [`move_shard`], for a crop of another map.
 fn move_crop(disk: &FaultyDisk) -> Result<()> {
     disk.take(&path("local"));
-    let crop = open(disk, &path("a"))
-        .and_then(|map| operations::crop_shard(&map, &Part::Inside(region()), path("local"), ID, |_, _| {}));
+    let crop = open(disk, &path("a")).and_then(|map| {
+        operations::crop_shard(&map, &Part::Inside(region()), false, path("local"), ID, |_, _| {})
+    });
     let made = crop.and_then(|_| {
         operations::move_shard(MapPath::on(disk.shared(), path("local")), path("out"), ID, |_, _| {})
     });
@@ -112,7 +113,7 @@ fn replace_tiles(disk: &FaultyDisk) -> Result<()> {
         return TileStore::open(disk.shared(), &path("a")).map(drop);
     }
     let map = MapPath::on(disk.shared(), path("a"));
-    operations::replace_tiles(map, &[open(disk, &path("b"))?], OF_FLUSH, 3, |_, _| {}).map(drop)
+    operations::replace_tiles(map, &[open(disk, &path("b"))?], OF_FLUSH, 3, None, |_, _| {}).map(drop)
 }
 
 /// A disk with a map of the same scans that keeps them.

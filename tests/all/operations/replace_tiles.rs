@@ -15,6 +15,7 @@ fn replace(disk: &FaultyDisk, parts: &[&str], of_flush: u64, scans: u64) -> Resu
         &parts,
         of_flush,
         scans,
+        None,
         |_, _| {},
     )
 }

@@ -132,7 +132,7 @@ fn a_region_without_a_tile_is_refused() {
     voxtile(&build(&scans, text(&map), &["--region", "0", "0"])).assert().code(2);
 }
 
-/// After removed scans or a replay, parts of one build merge like unrelated maps, because their scans may have other
+/// After removed scans or points, or a replay, parts of one build merge like unrelated maps, because their scans may have other
 /// poses.
 #[test]
 fn changed_parts_are_no_parts_of_one_build() {
@@ -151,12 +151,13 @@ fn changed_parts_are_no_parts_of_one_build() {
     std::fs::write(&turned_poses, turned.join("\n") + "\n").unwrap();
     let change = |number: usize, one: &str, other: &str| match number {
         0 => drop(output(&["remove-scans", one, "--scans", "2"])),
+        1 => drop(output(&["remove-points", one, "--region", "0", "-9", "-9", "9", "9", "9"])),
         _ => {
             output(&["remap", one, "--poses", text(&scans.join("poses_kitti.txt"))]);
             output(&["remap", other, "--poses", &turned_poses]);
         }
     };
-    for number in 0..2 {
+    for number in 0..3 {
         let parts = ["south_east", "north_east"].map(|name| path(&format!("{name}_{number}")));
         for (part, region) in parts.iter().zip([SOUTH_EAST, NORTH_EAST]) {
             output(&build(&scans, part, &[&region[..], &["--keep-scans"]].concat()));

@@ -4,10 +4,11 @@
 """
 
 from .building import BuildOptions, build
+from .cleaning import clean
 from .columns import decay, merge, verify
 from .comparing import CompareOptions, compare
 from .jobs import export, statistics
-from .remapping import remap
+from .remapping import remap, remove_points, remove_scans
 from .tiles import Tile, map_tiles
 
 __all__ = [
@@ -15,12 +16,15 @@ __all__ = [
     "CompareOptions",
     "Tile",
     "build",
+    "clean",
     "compare",
     "decay",
     "export",
     "map_tiles",
     "merge",
     "remap",
+    "remove_points",
+    "remove_scans",
     "statistics",
     "verify",
 ]

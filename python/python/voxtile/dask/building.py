@@ -94,10 +94,10 @@ def build(
     keeps each scan once, with the number and content that ``voxtile.build`` gives it.
 
     With ``update`` the scans are added to the map ``out``, as ``voxtile.build`` does with ``append`` and ``again``
-    and the same keywords. Pass ``max_range`` and similar options again: they are not taken from the map. Only the
-    regions that the scans reach are read. One flush replaces all changed tiles, so readers see the map before or
-    after the update. If another process changes the map meanwhile, the update raises an error and the map keeps that
-    process's changes.
+    and the same keywords. A map that keeps its scans keeps the new ones too. Pass ``max_range`` and similar options
+    again: they are not taken from the map. Only the regions that the scans reach are read. One flush replaces all
+    changed tiles, so readers see the map before or after the update. If another process changes the map meanwhile, the
+    update raises an error and the map keeps that process's changes.
 
     ``progress`` is called with the number of finished regions and their total. Returns a report of the build.
     """
@@ -129,7 +129,7 @@ def build(
         if settings.get("keep_scans"):
             columns = with_unreached(columns, boxes)
         drive = _fingerprint(source, size, settings, seen, str(output) if base else None)
-        if base is not None and (adopted := _committed_before(parts, drive, base)) is not None:
+        if base is not None and (adopted := _committed_before(parts, drive, source, base)) is not None:
             remove(parts)
             return {**adopted, "output": str(output), "regions_done_before": adopted["regions"]}
         map_id = _id_of(parts) if base is None else base.map_id
@@ -140,8 +140,7 @@ def build(
         open_parts = {part: what for part, what in wanted.items() if not part.exists()}
         # Start with the longest tasks: a short one at the end keeps few workers idle.
         longest = sorted(open_parts.items(), key=lambda what: -scans_in(what[1][1]))
-        of_map = None if base is None else str(output)
-        how = ((size, tile_size), settings, of_map)
+        how = ((size, tile_size), settings, None if base is None else (str(output), base.scan_number))
         checks = [
             found.submit(_check_part, str(part), pure=False, retries=2) for part in wanted if part not in open_parts
         ]
@@ -174,7 +173,7 @@ def build(
         if base is None:
             report["tiles"] = join(names, str(output))["tiles"]
         else:
-            report["adopted"] = _commit(output, names, drive, base, report)
+            report["adopted"] = _commit(output, names, drive, source, base, report)
         remove(parts)
     ended, ended_cpu = time.perf_counter(), time.process_time()
     seconds = sorted((task["seconds"] for task in tasks), reverse=True)
@@ -203,6 +202,9 @@ class _Base:
     # Number of scans that the map's list of scans lacks, because updates do not list them. ``None`` if unknown.
     unlisted_scans: int | None
     tile_size: float
+    keeps_scans: bool
+    # Names of inputs, each with the number of scans before it.
+    inputs: list[list[Any]]
 
 
 # Record of the update that is being committed, so that it is not applied twice.
@@ -216,14 +218,23 @@ _OWN_NAMES = re.compile(
 
 def _base(output: Path, settings: dict[str, Any]) -> _Base:
     report = describe(str(output))
-    if report["keeps_scans"]:
-        raise ArgumentError(f"{output}: the map keeps its scans; use voxtile.build, which supports this")
+    if settings.get("keep_scans") and not report["keeps_scans"]:
+        raise ArgumentError("keep_scans: an update cannot begin to keep scans; build the map with it")
+    settings["keep_scans"] = report["keeps_scans"]
     for name in ("resolution", "tile_size"):
         if settings.get(name, report[name]) != report[name]:
             raise ArgumentError(f"{name}: the map has {report[name]} m; leave this option out")
     scans, listed = report["scan_number"], report["scan_records"]
     unlisted = None if listed is None else scans - listed
-    return _Base(str(report["map_id"]), report["flush_number"], scans, unlisted, report["tile_size"])
+    return _Base(
+        map_id=str(report["map_id"]),
+        flush_number=report["flush_number"],
+        scan_number=scans,
+        unlisted_scans=unlisted,
+        tile_size=report["tile_size"],
+        keeps_scans=report["keeps_scans"],
+        inputs=[[input["name"], input["first_scan"]] for input in report["inputs"]],
+    )
 
 
 def _fingerprint(*what: object) -> str:
@@ -240,11 +251,19 @@ def _write_json(path: Path, what: object) -> None:
     os.replace(beside, path)
 
 
-def _commit(output: Path, names: Sequence[str], drive: str, base: _Base, report: dict[str, Any]) -> dict[str, Any]:
+def _commit(
+    output: Path, names: Sequence[str], drive: str, source: str, base: _Base, report: dict[str, Any]
+) -> dict[str, Any]:
     note = Path(names[0]).parent / _COMMITTING
     _write_json(note, {"drive": drive, "map": asdict(base), "report": report})
     try:
-        adopted: dict[str, Any] = replace_tiles(str(output), names, of_flush=base.flush_number, scans=report["scans"])
+        adopted: dict[str, Any] = replace_tiles(
+            str(output),
+            names,
+            of_flush=base.flush_number,
+            scans=report["scans"],
+            input=os.path.basename(source) if base.keeps_scans else None,
+        )
     except ArgumentError:
         # The map was changed by another process, and the update was not committed. After other errors this is unknown.
         note.unlink()
@@ -252,7 +271,7 @@ def _commit(output: Path, names: Sequence[str], drive: str, base: _Base, report:
     return adopted
 
 
-def _committed_before(parts: Path, drive: str, base: _Base) -> dict[str, Any] | None:
+def _committed_before(parts: Path, drive: str, source: str, base: _Base) -> dict[str, Any] | None:
     """Returns the report of a call that committed these scans and was killed before it removed the parts."""
     try:
         noted: dict[str, Any] = json.loads((parts / _COMMITTING).read_text(encoding="utf-8"))
@@ -262,6 +281,9 @@ def _committed_before(parts: Path, drive: str, base: _Base) -> dict[str, Any] | 
     if noted["drive"] != drive or before.map_id != base.map_id or before.flush_number == base.flush_number:
         return None
     report: dict[str, Any] = noted["report"]
+    if base.keeps_scans:
+        # The update is an input of the map.
+        return report if [os.path.basename(source), before.scan_number] in base.inputs else None
     # The flush number alone does not identify the update: another writer may have flushed scans. Those are in the list
     # of scans, unlike scans of updates.
     added = _difference(base.unlisted_scans, before.unlisted_scans)
@@ -314,8 +336,6 @@ def _check(output: Path, region_size: float, tile_size: float, options: Any, upd
     # A column narrower than two tiles may contain no tile center.
     if not (math.isfinite(region_size) and region_size >= 2 * tile_size):
         raise ArgumentError(f"region_size: {region_size} m is less than two tiles of {tile_size} m; use a larger size")
-    if update and options.get("keep_scans"):
-        raise ArgumentError("keep_scans: an update cannot begin to keep scans; build the map with it")
     if not update and "resolution" not in options:
         raise ArgumentError("resolution: a new map needs it; pass the edge of a voxel in metres")
     if not update and output.exists():
@@ -372,23 +392,26 @@ def _map_column(
     ranges: Sequence[Range],
     sizes: tuple[float, float],
     settings: dict[str, Any],
-    of_map: str | None,
+    of_map: tuple[str, int] | None,
 ) -> dict[str, Any]:
     """Maps a column on the worker's disk, and moves it to its place as a shard of the map.
 
-    ``sizes`` are the edges of a column and of a tile.
+    ``sizes`` are the edges of a column and of a tile, ``of_map`` the map to update and its number of scans.
     """
     began, cpu_began = time.perf_counter(), time.process_time()
     with tempfile.TemporaryDirectory(prefix="voxtile-", dir=_dask.get_worker().local_directory) as local:
         made = os.path.join(local, "map")
         try:
             if of_map is not None:
-                crop(of_map, made, tiles_of(column, *sizes), shard_of=map_id)
+                keeps: bool = settings["keep_scans"]
+                crop(of_map[0], made, tiles_of(column, *sizes), shard_of=map_id, keep_scans=keeps)
             for first, last in ranges:
                 options: dict[str, Any] = {**settings, "first": first, "count": last - first}
                 # Ranges after the first append other scans of the same input.
                 resume: dict[str, Any] = {"append": True, "again": True} if os.path.exists(made) else {}
-                files.build_shard(source, made, map_id, region=region_of(column, sizes[0]), **options, **resume)
+                region = region_of(column, sizes[0])
+                before = 0 if of_map is None else of_map[1]
+                files.build_shard(source, made, map_id, before, region=region, **options, **resume)
             move_to_place(made, part, map_id)
         except VoxtileError as error:
             # Keep the class of the error and extend its message.
