@@ -158,7 +158,7 @@ pub fn merge<'py>(
     };
     reported(py, progress, |_, progress| {
         let maps = maps.iter().map(MapOrSnapshot::open).collect::<Result<Vec<_>>>()?;
-        operations::merge(&maps, &output, prefer, |done, all| progress.report(done, all))
+        operations::merge(&maps, folder_of(&output)?, prefer, |done, all| progress.report(done, all))
     })
 }
 
@@ -337,8 +337,11 @@ pub fn crop<'py>(
     reported(py, progress, |_, progress| {
         let report = |done, all| progress.report(done, all);
         match shard_of {
-            None => operations::crop(&map.open()?, &part, scans, &output, report),
-            Some(map_id) => operations::crop_shard(&map.open()?, &part, keep_scans, &output, map_id, report),
+            None => operations::crop(&map.open()?, &part, scans, folder_of(&output)?, report),
+            Some(map_id) => {
+                let output = folder_of(&output)?;
+                operations::crop_shard(&map.open()?, &part, keep_scans, output, map_id, report)
+            }
         }
     })
 }
@@ -358,7 +361,8 @@ pub fn convert<'py>(
     let storage = storage_of(py, storage)?;
     let scans = if keep_scans { CopyScans::Yes } else { CopyScans::No };
     reported(py, progress, |_, progress| {
-        operations::convert(&map.open()?, &output, storage, scans, |done, all| progress.report(done, all))
+        let output = folder_of(&output)?;
+        operations::convert(&map.open()?, output, storage, scans, |done, all| progress.report(done, all))
     })
 }
 
@@ -375,7 +379,7 @@ pub fn import_octree<'py>(
     let storage = storage_of(py, storage)?;
     reported(py, progress, |_, progress| {
         let map = OctreeMap::of(octree_file::read(&file)?)?;
-        operations::import(&map, &output, storage, |done, all| progress.report(done, all))
+        operations::import(&map, folder_of(&output)?, storage, |done, all| progress.report(done, all))
     })
 }
 

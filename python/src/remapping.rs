@@ -141,7 +141,9 @@ pub fn remap_as<'py>(
             rays.clearing = clearing.or(rays.clearing);
             rays
         };
-        operations::rebuild(&reader, &output, config, rays, stop, |done, all| progress.report(done, all))
+        operations::rebuild(&reader, folder_of(&output)?, config, rays, stop, |done, all| {
+            progress.report(done, all)
+        })
     })
 }
 

@@ -154,7 +154,7 @@ pub fn replay_part(
 /// Applies a change with the parts of all columns: the shard of each, if there is one, and its text. One commit changes
 /// the map. Returns the report of the operation.
 #[pyfunction]
-#[pyo3(signature = (map, change, parts, *, keep_as=None, from_snapshots=false, memory=None))]
+#[pyo3(signature = (map, change, parts, *, keep_as=None, from_snapshots=false, memory=None, flush_number=None))]
 pub fn join_replay<'py>(
     py: Python<'py>,
     map: PathBuf,
@@ -163,6 +163,7 @@ pub fn join_replay<'py>(
     keep_as: Option<&str>,
     from_snapshots: bool,
     memory: Option<Bound<'py, PyAny>>,
+    flush_number: Option<u64>,
 ) -> PyResult<Bound<'py, PyAny>> {
     let change = AskedChange::of(py, &map, change)?;
     let replay = replay_of(py, keep_as, false, memory.as_ref())?;
@@ -174,6 +175,9 @@ pub fn join_replay<'py>(
         let parts: Vec<_> = parts.iter().map(read_part).collect::<Result<_>>()?;
         let how = replay.with_stop(stop.clone()).with_parts(parts);
         let ReadChange { scans, change, found } = change.read(&map, &how)?;
+        if flush_number.is_some_and(|begun_at| begun_at != scans.flush_number()) {
+            return Err(Error::Changed { path: map.clone() });
+        }
         let no_progress = |_, _| {};
         let report = match change {
             ScanChange::Move(poses, tolerance) => {

@@ -7,7 +7,7 @@ use crate::space::{Point, TileBox};
 use crate::store::{
     CatalogEntry, Disk, KeptRecord, KeptRecords, Layout, MapPath, ScanArchive, SegmentPlace, SegmentReader,
 };
-use std::cmp::Reverse;
+use std::cmp::{Ordering, Reverse};
 use std::collections::BinaryHeap;
 use std::sync::Arc;
 
@@ -58,6 +58,9 @@ pub(super) fn add_united_scans(
     united.next = before + 1;
     while let Some(entry) = united.next_entry()? {
         match entry {
+            CatalogEntry::Kept(scan) if scan.number <= before => {
+                return Err(united.differs(united.holder, scan.number));
+            }
             CatalogEntry::Kept(mut scan) => {
                 united.copy_points(archive, &mut scan, region)?;
                 archive.note(CatalogEntry::Kept(scan));
@@ -66,7 +69,11 @@ pub(super) fn add_united_scans(
             _ => return Err(united.differs(united.holder, united.next - 1)),
         }
     }
-    if united.next <= before + scans { Err(united.lacks(united.next)) } else { Ok(()) }
+    match united.next.cmp(&(before + scans + 1)) {
+        Ordering::Less => Err(united.lacks(united.next)),
+        Ordering::Equal => Ok(()),
+        Ordering::Greater => Err(united.differs(united.holder, united.next - 1)),
+    }
 }
 
 /// A part whose next scan is so many numbers ahead is closed until then.
@@ -253,6 +260,7 @@ impl<'a> UnitedScans<'a> {
         scan.tiles.extend(&same.tiles);
         let [a, b] = [self.holder, part].map(|part| &self.parts[part]);
         Ok(is_same_scan(scan, same)
+            && have_same_marks(a, scan, b, same)?
             && (have_same_bytes(a, scan.place, b, same.place)?
                 || have_same_points(a, scan.place, b, same.place)?))
     }
@@ -276,13 +284,25 @@ fn is_same_scan(a: &KeptRecord, b: &KeptRecord) -> bool {
     let of_scan = |record: &KeptRecord| {
         let mut scan = record.clone();
         (scan.updates, scan.place, scan.rays.region) = (0, SegmentPlace::default(), None);
+        if let Some(place) = scan.moving.as_mut().and_then(|marks| marks.place.as_mut()) {
+            *place = SegmentPlace::default();
+        }
         scan.tiles.clear();
         scan
     };
     of_scan(a) == of_scan(b)
 }
 
-/// Returns whether the same points are stored as the same bytes, which is the usual case and the faster test.
+/// Returns whether the same points are marked as moving.
+fn have_same_marks(a: &Part<'_>, of_a: &KeptRecord, b: &Part<'_>, of_b: &KeptRecord) -> Result<bool> {
+    let [place_in_a, place_in_b] = [of_a, of_b].map(|scan| scan.moving.and_then(|marks| marks.place));
+    match place_in_a.zip(place_in_b) {
+        Some((in_a, in_b)) => have_same_bytes(a, in_a, b, in_b),
+        None => Ok(true),
+    }
+}
+
+/// Returns whether blocks are stored as the same bytes, which is the usual case and the faster test.
 fn have_same_bytes(a: &Part<'_>, of_a: SegmentPlace, b: &Part<'_>, of_b: SegmentPlace) -> Result<bool> {
     if of_a.bytes != of_b.bytes {
         return Ok(false);

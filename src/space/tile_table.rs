@@ -49,7 +49,8 @@ const BLOCK_TILES: usize = 64;
 const MIN_RECENT: usize = 1024;
 /// Divisor for the maximum share of recent tiles.
 const RECENT_PART: usize = 16;
-/// Number of changes that are merged at once. Fewer than the minimum are inserted one by one.
+/// Number of changes that are merged at once, more in large tables, because a merge passes over all blocks. Fewer than
+/// the minimum are inserted one by one.
 const MIN_MERGED: usize = 64;
 const MAX_MERGED: usize = 1 << 12;
 /// Overhead of the allocator per block.
@@ -191,7 +192,7 @@ impl<V: TileValue> TileTable<V> {
 
     /// Inserts many tiles. The last of equal tiles counts.
     fn insert_all(&mut self, tiles: &mut Vec<(TileIndex, Option<V>)>) {
-        if tiles.len() < MIN_MERGED {
+        if tiles.len() < MIN_MERGED.max(self.blocks.len() / MIN_MERGED) {
             let tiles = tiles.iter().filter_map(|&(tile, value)| Some((tile, value?)));
             return tiles.for_each(|(tile, value)| self.insert(tile, value));
         }
@@ -334,7 +335,8 @@ impl<V: TileValue> Extend<(TileIndex, V)> for TileTable<V> {
         let (mut tiles, mut some) = (tiles.into_iter(), Vec::new());
         loop {
             some.clear();
-            some.extend(tiles.by_ref().take(MAX_MERGED).map(|(tile, value)| (tile, Some(value))));
+            let most = MAX_MERGED.max(self.tiles / RECENT_PART);
+            some.extend(tiles.by_ref().take(most).map(|(tile, value)| (tile, Some(value))));
             if some.is_empty() {
                 break;
             }

@@ -197,6 +197,11 @@ fn parts_of_another_map_or_state_are_refused() {
             let message = refused(&given);
             assert!(message.contains("pass all parts") || message.contains("no part replaces"), "{message}");
         }
+        // A shard is lost: its tiles must not become empty.
+        let mut without_shard = parts.clone();
+        without_shard[at_first].0 = None;
+        let message = refused(&without_shard);
+        assert!(message.contains("is missing"), "{message}");
         // There are no parts of an estimate.
         let message = message_of(apply(&disk, &change, with_parts(&disk, &parts).with_dry_run(true)));
         assert!(message.contains("parts"), "{message}");
@@ -211,8 +216,9 @@ fn parts_of_another_map_or_state_are_refused() {
             ScanChange::RemovePoints(found) => {
                 let rest =
                     PointsInBox::search(&scans(&disk).unwrap(), &found.region(), 13..=13, &Stop::default());
-                let all = PointsInBox::joined([found.clone(), rest.unwrap()]).unwrap();
-                apply(&disk, &ScanChange::RemovePoints(all), with_parts(&disk, &parts))
+                let message = message_of(PointsInBox::joined([found.clone(), rest.unwrap()]));
+                assert!(message.contains("different flushes"), "{message}");
+                apply(&disk, &change, with_parts(&disk, &parts))
             }
             change => apply(&disk, change, with_parts(&disk, &parts)),
         };

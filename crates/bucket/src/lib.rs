@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! push  map folder -> files of a flush -> parts, named by content -> pages -> manifest, written last
-//! read  manifest -> BucketDisk, a read-only `Disk` -> MapReader
+//! read  manifest -> BucketDisk, a `Disk` that reads the URL, and this machine's disk for other paths -> MapReader
 //! fetch objects below a URL -> files in a temporary folder -> readers of scans
 //! pull  manifest -> MAP.unfinished, which keeps files that are already complete -> MAP
 //! ```

@@ -142,12 +142,12 @@ impl Earlier {
     }
 
     /// Returns the path of a file that may be unchanged: a file of a tile that is unchanged according to the log, or a
-    /// file of kept scans, for which the log has no checksum.
+    /// segment of kept scans, for which the log has no checksum. Writers append to catalogs, so they are not shared.
     fn unchanged_file(&self, path: &str, file: &StoredFile) -> Option<PathBuf> {
         let place = self.store.folder().join(path);
         let (folder, name) = path.split_once('/')?;
         if folder == KEPT_SCANS {
-            return Some(place);
+            return Layout::segment_of(name).map(|_| place);
         }
         let version = self.store.tiles().version(tile_of_folder(folder)?)?;
         let of_tile = self

@@ -21,7 +21,8 @@ pub struct CloudPoints {
 const BYTES_OF_POINT: usize = size_of::<[f64; 3]>() + size_of::<f32>();
 const BYTES_OF_COLOUR: usize = size_of::<Option<[u8; 3]>>();
 const BYTES_OF_CLASS: usize = size_of::<Option<u8>>();
-const BYTES_OF_TIME: usize = size_of::<i64>();
+/// A time, and for limits the position at the stamp.
+const BYTES_OF_DESKEWED: usize = size_of::<i64>() + size_of::<[f64; 3]>() + size_of::<bool>();
 
 impl CloudPoints {
     /// Returns the memory of the decoded points of a message, in addition to the message itself.
@@ -30,7 +31,7 @@ impl CloudPoints {
         let bytes = BYTES_OF_POINT
             + if attributes.colours { BYTES_OF_COLOUR } else { 0 }
             + if attributes.classes { BYTES_OF_CLASS } else { 0 }
-            + if is_deskewed { BYTES_OF_TIME } else { 0 };
+            + if is_deskewed { BYTES_OF_DESKEWED } else { 0 };
         usize::try_from(message.points_claimed()).unwrap_or(usize::MAX).saturating_mul(bytes)
     }
 

@@ -64,7 +64,7 @@ impl CloudReader {
                 "{clouds} deskewed in part: transforms at the times of the last points did not arrive"
             );
         }
-        if self.is_deskewed && motion.is_none() && self.without_times.insert(cloud.topic) {
+        if self.is_deskewed && cloud.periods.is_none() && self.without_times.insert(cloud.topic) {
             log::warn!(
                 "--deskew has no effect: a cloud of {} has no field of point times",
                 cloud.frame.escape_debug()

@@ -82,7 +82,7 @@ impl TransformBuffer {
         counters: &mut Counters,
     ) {
         if self.samples.0 >= FORGET_EVERY {
-            self.remove_old(queue, counters);
+            self.remove_old(now, queue, counters);
         }
         let (new, kept) = self.samples;
         let (parent, child) = (&pose.header.frame_id, &pose.child_frame);
@@ -113,8 +113,8 @@ impl TransformBuffer {
     }
 
     /// Removes old samples. If too many are left, also removes samples of the frames with most samples.
-    fn remove_old(&mut self, queue: &mut CloudQueue, counters: &mut Counters) {
-        queue.settle(|cloud| self.find(cloud, false).ok());
+    fn remove_old(&mut self, now: Instant, queue: &mut CloudQueue, counters: &mut Counters) {
+        queue.settle(|cloud| self.find(cloud, self.is_late(cloud, now)).ok());
         let mut left = self.transforms.forget_older_than(SPAN_NS);
         while left > MAX_SAMPLES - FORGET_EVERY {
             let lost = self.transforms.shrink_largest();
@@ -171,7 +171,7 @@ impl TransformBuffer {
         if !self.sensors.contains_key(bare(&cloud.frame)) && self.sensors.len() < MAX_SENSORS {
             self.sensors.insert(bare(&cloud.frame).to_owned(), None);
         }
-        let is_late = now.saturating_duration_since(cloud.arrived) >= self.max_wait;
+        let is_late = self.is_late(cloud, now);
         let why = match cloud.poses.clone().map_or_else(|| self.find(cloud, is_late), Ok) {
             Ok(poses) => {
                 if let Some(stamp_ns) = self.sensors.get_mut(bare(&cloud.frame)) {
@@ -204,6 +204,11 @@ impl TransformBuffer {
         }
         log::debug!("cloud dropped without a pose in {}: {}", self.fixed_frame, printable(&why));
         Verdict::Expired
+    }
+
+    /// Returns whether a cloud has waited for its transforms long enough.
+    fn is_late(&self, cloud: &Cloud, now: Instant) -> bool {
+        now.saturating_duration_since(cloud.arrived) >= self.max_wait
     }
 
     /// Warns of clouds that were dropped without a pose, if a warning is due.

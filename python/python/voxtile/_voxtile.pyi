@@ -393,6 +393,7 @@ def join_replay(
     keep_as: str | None = None,
     from_snapshots: bool = False,
     memory: int | str | None = None,
+    flush_number: int | None = None,
 ) -> dict[str, Any]: ...
 def search_points(map: _Path, region: ArrayLike, first: int, last: int) -> str: ...
 def check_replay(

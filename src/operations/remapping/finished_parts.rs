@@ -28,7 +28,8 @@ impl FinishedParts {
     ///
     /// # Errors
     ///
-    /// Parts of overlapping regions or of another flush; a missing part, if the change affects all tiles.
+    /// Parts of overlapping regions or of another flush; a part without its shard; a missing part, if the change affects
+    /// all tiles.
     pub(super) fn of(
         parts: &[(Option<MapPath>, ReplayPart)],
         store: &TileStore,
@@ -37,6 +38,13 @@ impl FinishedParts {
         let listed = || parts.iter().map(|(_, part)| part);
         if listed().any(|part| part.flush_number != store.commits().flush_number) {
             return Err(Error::Changed { path: store.folder().to_owned() });
+        }
+        let needs_shard = |part: &ReplayPart| !(part.replaced.is_empty() && part.changed.is_empty());
+        if let Some((_, part)) = parts.iter().find(|(shard, part)| shard.is_none() && needs_shard(part)) {
+            let [first, last] = part.region.map(TileIndex::from);
+            let reason =
+                format!("the shard of the tiles {first} to {last} is missing: replay this part again");
+            return Err(Error::argument("parts", reason));
         }
         let mut scans: FxHashMap<u64, (u64, Vec<TileIndex>)> = FxHashMap::default();
         for scan in listed().flat_map(|part| &part.changed) {

@@ -13,6 +13,8 @@ use std::path::Path;
 /// processes can share.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct PointsInBox {
+    /// Flush of the map that was searched.
+    flush_number: u64,
     /// Lower and upper corner in metres, as the bits of floating-point numbers: text would round them.
     corners: [[u64; 3]; 2],
     /// First and last number of each range of scans that were searched.
@@ -42,6 +44,7 @@ impl PointsInBox {
             return Err(Error::Changed { path: folder.to_owned() });
         }
         let mut found = Self {
+            flush_number: reader.flush_number(),
             corners: [region.min, region.max].map(|corner| corner.map(f64::to_bits)),
             searched: vec![(*numbers.start(), *numbers.end())],
             scans: Vec::new(),
@@ -65,7 +68,7 @@ impl PointsInBox {
     ///
     /// # Errors
     ///
-    /// No search, or searches of different boxes.
+    /// No search, or searches of different boxes or flushes.
     pub fn joined(searches: impl IntoIterator<Item = Self>) -> Result<Self> {
         let mut searches = searches.into_iter();
         let Some(mut all) = searches.next() else {
@@ -74,6 +77,9 @@ impl PointsInBox {
         for search in searches {
             if search.corners != all.corners {
                 return Err(Error::argument("searches", "are of different boxes"));
+            }
+            if search.flush_number != all.flush_number {
+                return Err(Error::argument("searches", "are of different flushes: search again"));
             }
             all.searched.extend(search.searched);
             all.scans.extend(search.scans);
@@ -99,10 +105,15 @@ impl PointsInBox {
     ///
     /// # Errors
     ///
-    /// A scan that was not searched, or one that the map does not keep.
+    /// [`Error::Changed`] if the map was flushed since the search; a scan that was not searched, or one that the map does
+    /// not keep.
     pub(super) fn changes(&self, scans: &KeptSummary) -> Result<Changes> {
         let (region, mut ranges) = (self.region(), self.searched.iter().peekable());
-        check_box(&region, scans.place().1)?;
+        let (_, folder) = scans.place();
+        check_box(&region, folder)?;
+        if self.flush_number != scans.flush_number() {
+            return Err(Error::Changed { path: folder.to_owned() });
+        }
         let mut changes: Changes =
             self.scans.iter().map(|(number, _)| (*number, Change::Filter(region))).collect();
         let mut found = 0;

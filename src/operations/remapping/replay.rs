@@ -26,8 +26,8 @@ pub struct Replay {
     pub is_dry_run: bool,
     /// Request to stop. After a stop the map is unchanged.
     pub stop: Stop,
-    /// Finished parts of all columns ([`replay_part`](super::replay_part()), each with its shard if there is one. They
-    /// are committed; the shards are unchanged. Default: this process replays the affected tiles.
+    /// Finished parts of all columns ([`replay_part`](super::replay_part())), each with its shard if there is one.
+    /// They are committed; the shards are unchanged. Default: this process replays the affected tiles.
     pub parts: Option<Vec<(Option<MapPath>, ReplayPart)>>,
 }
 

@@ -176,6 +176,8 @@ impl ReplayPart {
         self.scans_mapped += 1;
         self.updates_mapped += updates;
         if !tiles.is_empty() && (change.is_some() || touched.tiles.is_none()) {
+            // Scans without a change keep their list of tiles.
+            let tiles = if change.is_some() { tiles } else { Vec::new() };
             let tiles = tiles.into_iter().map(TileIndex::to_array).collect();
             self.changed.push(ChangedScan { number, updates, tiles });
         }

@@ -141,7 +141,13 @@ class Replaying:
         self._run(futures, done_before, len(names), checks)
         texts = [(str(name) if name.exists() else None, _read(name) or "") for name in names]
         report: dict[str, Any] = join_replay(
-            self.map, change, texts, keep_as=keep_as, from_snapshots=from_snapshots, memory=self.memory
+            self.map,
+            change,
+            texts,
+            keep_as=keep_as,
+            from_snapshots=from_snapshots,
+            memory=self.memory,
+            flush_number=self._flush_number,
         )
         return {**report, "parts": len(names), "parts_done_before": done_before}
 
