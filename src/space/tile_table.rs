@@ -52,7 +52,9 @@ const RECENT_PART: usize = 16;
 /// Number of changes that are merged at once, more in large tables, because a merge passes over all blocks. Fewer than
 /// the minimum are inserted one by one.
 const MIN_MERGED: usize = 64;
-const MAX_MERGED: usize = 1 << 12;
+const MAX_MERGED: usize = 1 << 10;
+/// Divisor for the share of the tiles that is merged at once into large tables.
+const MERGED_PART: usize = 64;
 /// Overhead of the allocator per block.
 const ALLOCATION_BYTES: usize = 16;
 
@@ -197,7 +199,10 @@ impl<V: TileValue> TileTable<V> {
             return tiles.for_each(|(tile, value)| self.insert(tile, value));
         }
         self.pack();
-        tiles.sort_by_key(|&(tile, _)| tile);
+        // Sorting takes memory, and most lists are sorted.
+        if !tiles.is_sorted_by_key(|(tile, _)| *tile) {
+            tiles.sort_by_key(|&(tile, _)| tile);
+        }
         tiles.dedup_by(|next, kept| {
             let is_same = next.0 == kept.0;
             if is_same {
@@ -335,7 +340,7 @@ impl<V: TileValue> Extend<(TileIndex, V)> for TileTable<V> {
         let (mut tiles, mut some) = (tiles.into_iter(), Vec::new());
         loop {
             some.clear();
-            let most = MAX_MERGED.max(self.tiles / RECENT_PART);
+            let most = MAX_MERGED.max(self.tiles / MERGED_PART);
             some.extend(tiles.by_ref().take(most).map(|(tile, value)| (tile, Some(value))));
             if some.is_empty() {
                 break;
