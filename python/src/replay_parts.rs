@@ -153,6 +153,7 @@ pub fn replay_part(
 
 /// Applies a change with the parts of all columns: the shard of each, if there is one, and its text. One commit changes
 /// the map. Returns the report of the operation.
+#[expect(clippy::too_many_arguments, reason = "keywords, in Python")]
 #[pyfunction]
 #[pyo3(signature = (map, change, parts, *, keep_as=None, from_snapshots=false, memory=None, flush_number=None))]
 pub fn join_replay<'py>(
