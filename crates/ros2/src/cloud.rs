@@ -18,3 +18,19 @@ pub struct Cloud {
     /// Poses, if they were looked up before mapping.
     pub poses: Option<CloudPoses>,
 }
+
+impl Cloud {
+    /// A cloud that arrives now.
+    pub fn new(topic: usize, stamp_ns: i64, frame: String, cdr: Vec<u8>) -> Self {
+        Self {
+            topic,
+            stamp_ns,
+            frame,
+            cdr,
+            points_bytes: 0,
+            arrived: Instant::now(),
+            periods: None,
+            poses: None,
+        }
+    }
+}

@@ -138,20 +138,10 @@ pub fn bytes_of(cloud: &Cloud) -> usize {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::time::Instant;
 
     fn cloud(topic: usize, stamp_ns: i64) -> Cloud {
         let (frame, cdr) = (String::new(), vec![0; 744]);
-        Cloud {
-            topic,
-            stamp_ns,
-            frame,
-            cdr,
-            points_bytes: 0,
-            arrived: Instant::now(),
-            periods: None,
-            poses: None,
-        }
+        Cloud::new(topic, stamp_ns, frame, cdr)
     }
 
     fn stamps(queue: &mut CloudQueue) -> Vec<i64> {

@@ -89,16 +89,7 @@ impl Inbox {
             }
         };
         let (stamp_ns, frame) = (header.stamp_ns, header.frame_id);
-        let mut cloud = Cloud {
-            topic,
-            stamp_ns,
-            frame,
-            cdr,
-            points_bytes,
-            arrived: Instant::now(),
-            periods,
-            poses: None,
-        };
+        let mut cloud = Cloud { points_bytes, periods, ..Cloud::new(topic, stamp_ns, frame, cdr) };
         while state.queue.must_wait(&cloud) && !state.is_closed {
             state = self.changed.wait(state).unwrap_or_else(PoisonError::into_inner);
         }

@@ -321,16 +321,7 @@ mod tests {
 
     fn cloud(stamp_ns: i64) -> Cloud {
         let (frame, cdr) = ("lidar".to_owned(), Vec::new());
-        Cloud {
-            topic: 0,
-            stamp_ns,
-            frame,
-            cdr,
-            points_bytes: 0,
-            arrived: Instant::now(),
-            periods: None,
-            poses: None,
-        }
+        Cloud::new(0, stamp_ns, frame, cdr)
     }
 
     #[test]

@@ -32,16 +32,7 @@ fn cloud(points_m: Vec<[f64; 3]>) -> Cloud {
     let frame = "lidar".to_owned();
     let header = messages::Header { frame_id: frame.clone(), ..messages::Header::default() };
     let cdr = messages::PointCloud2::of_points(header, points_m).cdr();
-    Cloud {
-        topic: 0,
-        stamp_ns: 0,
-        frame,
-        cdr,
-        points_bytes: 0,
-        arrived: Instant::now(),
-        periods: None,
-        poses: None,
-    }
+    Cloud::new(0, 0, frame, cdr)
 }
 
 fn at(sensor_m: Point) -> CloudPoses {
