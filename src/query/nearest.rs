@@ -3,11 +3,11 @@ use super::region::{BrickPart, tiles_of_list_in, voxels_around};
 use super::{Hit, Occupancy};
 use crate::error::{Error, Result};
 use crate::mapper::MapView;
-use crate::space::{Aabb, BRICK_EDGE, Grid, Point, TileBox, TileIndex, VoxelBox};
-use crate::tile::Tile;
+use crate::space::{Aabb, BRICK_EDGE, Grid, Point, TileBox, TileIndex, VoxelBox, VoxelIndex};
+use crate::tile::{MarkedBlock, Table, Tile};
 
 /// Radius of the first ball that is searched, in edges of a brick. The radius is doubled for each further ball.
-const FIRST_BRICKS: f64 = 1.0;
+const FIRST_BRICKS: f64 = 2.0;
 
 pub(super) fn nearest_occupied<V: MapView + ?Sized>(
     view: &V,
@@ -55,6 +55,13 @@ pub(super) fn check(point: Point, max_distance_m: f64) -> Result<()> {
     Err(Error::argument("nearest occupied", "needs a finite point and a distance of at least 0 m"))
 }
 
+/// Blocks and bricks of a ball, nearest first; kept between tiles, so that they are allocated once.
+#[derive(Default)]
+struct NearestFirst {
+    blocks: Vec<(f64, MarkedBlock)>,
+    bricks: Vec<(f64, u32, VoxelIndex)>,
+}
+
 fn nearest_in_ball<V: MapView + ?Sized>(
     view: &V,
     point: Point,
@@ -62,42 +69,24 @@ fn nearest_in_ball<V: MapView + ?Sized>(
     all_tiles: &mut Option<Vec<TileIndex>>,
 ) -> Result<Option<Hit>> {
     let config = view.config();
-    let (grid, threshold) = (config.grid, config.occupied_log_odds());
-    let ball = |radius_m: f64| Aabb { min: point.map(|c| c - radius_m), max: point.map(|c| c + radius_m) };
-    let around = voxels_around(&grid, &ball(max_distance_m));
-    let mut tiles: Vec<(f64, TileIndex)> = tiles_of_list_in(view, &around, all_tiles)
+    let grid = config.grid;
+    let mut nearest = Nearest::new(grid, point, config.occupied_log_odds(), max_distance_m);
+    let around = |radius_m: f64| {
+        voxels_around(&grid, &Aabb { min: point.map(|c| c - radius_m), max: point.map(|c| c + radius_m) })
+    };
+    let mut tiles: Vec<(f64, TileIndex)> = tiles_of_list_in(view, &around(max_distance_m), all_tiles)
         .into_iter()
-        .map(|index| (distance_to_voxels_m(&grid, &grid.voxels_of_tile(index), point), index))
+        .map(|index| (nearest.least_square(&grid.voxels_of_tile(index)), index))
         .collect();
-    tiles.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-    let mut nearest = Nearest::new(grid, point, threshold, max_distance_m);
-    let mut nearest_first: Vec<(f64, BrickPart)> = Vec::new();
-    for (distance_m, index) in tiles {
-        if distance_m > nearest.limit_m() {
+    tiles.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
+    let mut nearest_first = NearestFirst::default();
+    for (square, index) in tiles {
+        if nearest.is_too_far(square) {
             break;
         }
-        let Some(tile) = view.tile(index)? else { continue };
-        let around = voxels_around(&grid, &ball(nearest.limit_m())).intersection(&tile.voxel_box());
-        nearest_first.clear();
-        let mut note = |brick: BrickPart| {
-            if brick.voxels.intersection(&around).is_empty() {
-                return;
-            }
-            let distance_m = distance_to_voxels_m(&grid, &brick.voxels, point);
-            if distance_m <= nearest.limit_m() && brick.may_hold(&tile, threshold) {
-                nearest_first.push((distance_m, brick));
-            }
-        };
-        // Most bricks are free space and are skipped without examining their voxels.
-        if !tile.table().visit_marked(&around, threshold, |lowest| note(BrickPart::whole(lowest))) {
-            bricks_around(&tile, &around).for_each(note);
-        }
-        nearest_first.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
-        for (distance_m, brick) in &nearest_first {
-            if *distance_m > nearest.limit_m() {
-                break;
-            }
-            nearest.look_at(&tile, brick);
+        if let Some(tile) = view.tile(index)? {
+            let around = around(nearest.limit_m()).intersection(&tile.voxel_box());
+            nearest_first.look_at(&mut nearest, &tile, &around);
         }
     }
     let found = nearest.into_best();
@@ -105,6 +94,53 @@ fn nearest_in_ball<V: MapView + ?Sized>(
         probability: Occupancy::of(config, Some(evidence)).probability(),
         ..hit
     }))
+}
+
+impl NearestFirst {
+    /// Examines the voxels of a tile in a box around the ball.
+    fn look_at(&mut self, nearest: &mut Nearest, tile: &Tile, around: &VoxelBox) {
+        let (table, Self { blocks, bricks }) = (tile.table(), self);
+        // Most bricks are free space and are skipped without examining their voxels.
+        blocks.clear();
+        let are_marked = table.visit_marked(around, nearest.threshold(), |block| {
+            let square = nearest.least_square(&block.voxels());
+            if !nearest.is_too_far(square) {
+                blocks.push((square, block));
+            }
+        });
+        if !are_marked {
+            bricks.clear();
+            bricks.extend(bricks_around(tile, around).filter_map(|brick| {
+                Some((nearest.least_square(&brick.voxels), brick.number_in(tile)?, brick.voxels.min))
+            }));
+            return look_at_bricks(bricks, nearest, table);
+        }
+        blocks.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
+        for (square, block) in blocks {
+            if nearest.is_too_far(*square) {
+                break;
+            }
+            bricks.clear();
+            nearest.for_each_brick(block, |square, place| {
+                let number = table.number_in_block(block, place);
+                bricks.extend(number.map(|number| (square, number, block.lowest_of(place))));
+            });
+            look_at_bricks(bricks, nearest, table);
+        }
+    }
+}
+
+/// Examines the voxels of bricks: lower bound of their squared distances, number, lowest voxel.
+fn look_at_bricks(bricks: &mut [(f64, u32, VoxelIndex)], nearest: &mut Nearest, table: &Table) {
+    bricks.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
+    for &(square, number, lowest) in &*bricks {
+        if nearest.is_too_far(square) {
+            break;
+        }
+        if let Some(brick) = table.numbered(number) {
+            nearest.look_at(brick, lowest);
+        }
+    }
 }
 
 /// Returns the bricks of a tile that may have voxels in a box, unclipped and in no particular order.
@@ -120,14 +156,4 @@ fn bricks_around(tile: &Tile, voxels: &VoxelBox) -> impl Iterator<Item = BrickPa
     let places = (!is_large && !voxels.is_empty())
         .then(|| along(0).flat_map(move |x| along(1).flat_map(move |y| along(2).map(move |z| [x, y, z]))));
     listed.chain(places.into_iter().flatten().map(BrickPart::whole))
-}
-
-/// Returns a lower bound for the distance of a point to the voxels of a box.
-fn distance_to_voxels_m(grid: &Grid, voxels: &VoxelBox, point: Point) -> f64 {
-    // A margin of one voxel for the rounding between voxel borders and multiples of the resolution.
-    let bounds = Aabb {
-        min: voxels.min.map(|k| (f64::from(k) - 1.0) * grid.resolution_m()),
-        max: voxels.end.map(|k| (f64::from(k) + 1.0) * grid.resolution_m()),
-    };
-    bounds.distance_squared(point).sqrt()
 }

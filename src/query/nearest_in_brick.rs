@@ -1,8 +1,7 @@
 use super::Hit;
-use super::region::BrickPart;
 use crate::sensor::Evidence;
-use crate::space::{BRICK_EDGE, Grid, Point, VoxelIndex};
-use crate::tile::Tile;
+use crate::space::{BRICK_EDGE, Grid, Point, VoxelBox, VoxelIndex};
+use crate::tile::{BrickView, MarkedBlock};
 
 /// Nearest voxel to a point among those examined so far.
 pub(super) struct Nearest {
@@ -18,8 +17,11 @@ pub(super) struct Nearest {
 /// Voxels along an edge of an octant: a word of a brick's mask.
 const OCTANT_EDGE: usize = BRICK_EDGE as usize / 2;
 
-/// Coordinates of a bit in an octant's word.
-const OCTANT_VOXELS: [[u8; 3]; 64] = {
+/// Bricks along an edge of a block.
+const BLOCK_STEPS: usize = 4;
+
+/// Coordinates of a bit in a word of 4 x 4 x 4 bits in Morton order: voxels of an octant, bricks of a block.
+const PLACES: [[u8; 3]; 64] = {
     let mut voxels = [[0; 3]; 64];
     let mut bit = 0;
     while bit < 64 {
@@ -47,10 +49,52 @@ impl Nearest {
         self.best
     }
 
+    /// Minimum log-odds of the voxels to find.
+    pub(super) fn threshold(&self) -> f64 {
+        self.threshold
+    }
+
+    /// Lower bound of the squared distances to the centers of the voxels of a box.
+    pub(super) fn least_square(&self, voxels: &VoxelBox) -> f64 {
+        let least = |axis| self.least_along(axis, voxels.min[axis], voxels.end[axis].saturating_sub(1));
+        least(0) + least(1) + least(2)
+    }
+
+    /// Lower bound of the squared distances along an axis to the centers of the voxels from `first` to `last`.
+    #[inline]
+    fn least_along(&self, axis: usize, first: i32, last: i32) -> f64 {
+        // Centers are rounded in the same way as those of single voxels, and rounding keeps their order.
+        let center_m = |voxel: i32| self.grid.center_along_m(voxel);
+        let outside_m = (center_m(first) - self.point[axis]).max(self.point[axis] - center_m(last)).max(0.0);
+        outside_m * outside_m
+    }
+
+    /// Visits the marked bricks of a block that may contain a nearer voxel, as lower bound of their squared distances and
+    /// position in the block.
+    pub(super) fn for_each_brick(&self, block: &MarkedBlock, mut visit: impl FnMut(f64, usize)) {
+        let least: [[f64; BLOCK_STEPS]; 3] = std::array::from_fn(|axis| {
+            std::array::from_fn(|step| {
+                let first = block.min[axis].saturating_add(BRICK_EDGE * step as i32);
+                self.least_along(axis, first, first.saturating_add(BRICK_EDGE - 1))
+            })
+        });
+        let mut marks = block.marks;
+        while marks != 0 {
+            let place = marks.trailing_zeros() as usize;
+            marks &= marks - 1;
+            let [x, y, z] = PLACES[place].map(usize::from);
+            let square = least[0][x] + least[1][y] + least[2][z];
+            if !self.is_too_far(square) {
+                visit(square, place);
+            }
+        }
+    }
+
     /// Examines the voxels of a brick, starting with the octant closest to the point.
-    pub(super) fn look_at(&mut self, tile: &Tile, brick: &BrickPart) {
-        let Some(look) = brick.look(tile) else { return };
-        let lowest = brick.voxels.min;
+    pub(super) fn look_at(&mut self, brick: BrickView<'_>, lowest: VoxelIndex) {
+        if brick.is_below(self.threshold) {
+            return;
+        }
         let squares = self.squared_distances(lowest);
         let next_to_point = (0..3).fold(0, |octant, axis| {
             let [low, high] = [OCTANT_EDGE - 1, OCTANT_EDGE].map(|k| squares[axis][k]);
@@ -65,15 +109,15 @@ impl Nearest {
             if self.is_too_far(least(0) + least(1) + least(2)) {
                 continue;
             }
-            let mut bits = look.word_from(octant, self.threshold);
+            let mut bits = brick.word_from(octant, self.threshold);
             while bits != 0 {
                 let bit = bits.trailing_zeros() as usize;
                 bits &= bits - 1;
-                let [x, y, z] = OCTANT_VOXELS[bit].map(usize::from);
+                let [x, y, z] = PLACES[bit].map(usize::from);
                 if !self.is_too_far(of_axis(0)[x] + of_axis(1)[y] + of_axis(2)[z]) {
                     let steps = [first[0] + x, first[1] + y, first[2] + z];
                     let voxel = std::array::from_fn(|axis| lowest[axis].saturating_add(steps[axis] as i32));
-                    self.compare(voxel, || look.get(octant * 64 + bit));
+                    self.compare(voxel, || brick.get(octant * 64 + bit));
                 }
             }
         }
@@ -92,7 +136,7 @@ impl Nearest {
     }
 
     /// Returns whether a squared distance certainly exceeds the limit, with a margin for rounding.
-    fn is_too_far(&self, distance_squared: f64) -> bool {
+    pub(super) fn is_too_far(&self, distance_squared: f64) -> bool {
         distance_squared > self.limit_m * self.limit_m * (1.0 + 1e-12)
     }
 

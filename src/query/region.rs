@@ -188,8 +188,12 @@ impl BrickPart {
     }
 
     pub(super) fn look<'a>(&self, tile: &'a Tile) -> Option<BrickView<'a>> {
-        let table = tile.table();
-        table.number_of_brick(self.code).and_then(|number| table.numbered(number))
+        self.number_in(tile).and_then(|number| tile.table().numbered(number))
+    }
+
+    /// Number of the brick in the tile's table.
+    pub(super) fn number_in(&self, tile: &Tile) -> Option<u32> {
+        tile.table().number_of_brick(self.code)
     }
 }
 

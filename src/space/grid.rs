@@ -198,7 +198,13 @@ impl Grid {
 
     /// Center of a voxel in metres: `(index + 0.5) * resolution`.
     pub fn center_m(&self, voxel: VoxelIndex) -> Point {
-        voxel.map(|index| (f64::from(index) + 0.5) * self.resolution_m)
+        voxel.map(|index| self.center_along_m(index))
+    }
+
+    /// Coordinate in metres of the centers of the voxels with this index along an axis.
+    #[inline]
+    pub(crate) fn center_along_m(&self, index: i32) -> f64 {
+        (f64::from(index) + 0.5) * self.resolution_m
     }
 
     /// Lower border in metres of the voxels with this index along an axis, without rounding noise (0.3 instead of

@@ -20,7 +20,7 @@ pub use layers::{ClassVotes, ColourSums, IntensitySums, LayerTable, ShapeSums, T
 pub use octocache::{OctreeQueueCounts, OctreeStatistics, OctreeTimes, VoxelCache, VoxelCacheCounts};
 pub use octree::OctreeFactory;
 pub use table::Table;
-pub(crate) use table::{BrickView, VoxelBatch};
+pub(crate) use table::{BrickView, MarkedBlock, VoxelBatch};
 pub use tile_body::{Tile, TileCounts, Voxel};
 
 #[cfg(test)]

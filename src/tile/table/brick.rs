@@ -100,10 +100,10 @@ impl Brick {
     /// One word of [`Brick::mask_from`].
     pub(crate) fn word_from(&self, word: usize, threshold: f64, palette: &Palette) -> u64 {
         let from_threshold = match &self.evidence {
-            Storage::Interned(cells) => {
-                cells.cell(word).map(|cell| bits_of(cell, |state| palette.evidence(state), threshold))
-            }
-            Storage::Plain(cells) => cells.cell(word).map(|cell| bits_of(cell, Evidence::from, threshold)),
+            Storage::Interned(cells) => cells.cell(word).map(|cell| bits_of_states(cell, threshold, palette)),
+            Storage::Plain(cells) => cells
+                .cell(word)
+                .map(|cell| bits_of(cell.map(|evidence| Evidence::from(evidence).log_odds >= threshold))),
         };
         from_threshold.unwrap_or(0) & self.observed[word]
     }
@@ -225,9 +225,57 @@ impl Brick {
     }
 }
 
-/// Bits of the values of a cell whose log-odds are at least a threshold. Branchless, because they are hard to predict.
+/// Bits of the states of a cell whose log-odds are at least a threshold.
+fn bits_of_states(cell: &[StateId; CELL_VOXELS], threshold: f64, palette: &Palette) -> u64 {
+    // Rounded numbers keep their order. Only those that equal the rounded threshold are compared exactly.
+    let (values, rounded) = (palette.values(cell), threshold as f32);
+    let mut bits = bits_of(values.map(|value| value > rounded));
+    let mut equal = bits_of(values.map(|value| value == rounded));
+    while equal != 0 {
+        let bit = equal.trailing_zeros();
+        equal &= equal - 1;
+        let is_from = palette.evidence(cell[bit as usize]).log_odds >= threshold;
+        bits |= u64::from(is_from) << bit;
+    }
+    bits
+}
+
+/// Packs flags into bits. Branchless, because they are hard to predict.
 #[inline]
-fn bits_of<T: Copy>(cell: &[T; CELL_VOXELS], evidence: impl Fn(T) -> Evidence, threshold: f64) -> u64 {
-    let bit = |(bit, &value): (usize, &T)| u64::from(evidence(value).log_odds >= threshold) << bit;
-    cell.iter().enumerate().map(bit).fold(0, |bits, bit| bits | bit)
+fn bits_of(flags: [bool; CELL_VOXELS]) -> u64 {
+    let mut bits = 0;
+    for (byte, flags) in flags.as_chunks::<8>().0.iter().enumerate() {
+        // The product moves the lowest bit of each byte into the uppermost byte.
+        let flags = u64::from_le_bytes(flags.map(u8::from));
+        bits |= (flags.wrapping_mul(0x0102_0408_1020_4080) >> 56) << (8 * byte);
+    }
+    bits
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use voxtile_simulation::Random;
+
+    #[test]
+    fn bits_of_states_are_exact_where_rounding_hides_a_difference() {
+        let (mut palette, mut random) = (Palette::default(), Random::of(9, &[]));
+        let near_0_1 = |ulps: i64| f64::from_bits((0.1_f64.to_bits() as i64 + ulps) as u64);
+        let log_odds =
+            [-3.5, -0.0, 0.0, 2.0, near_0_1(-1), 0.1, near_0_1(1), near_0_1(1 << 40), 1e-300, f64::MAX];
+        let states: Vec<StateId> = log_odds
+            .map(|log_odds| palette.intern(Evidence { log_odds, observation_count: 1 }).unwrap())
+            .to_vec();
+        for threshold in [0.0, -0.0, 0.1, near_0_1(1), 1e-320, f64::INFINITY, f64::NEG_INFINITY, f64::MAX] {
+            for _ in 0..20 {
+                let cell: [StateId; CELL_VOXELS] =
+                    std::array::from_fn(|_| states[random.below(states.len() as u64) as usize]);
+                let is_from = |(bit, &state): (usize, &StateId)| {
+                    u64::from(palette.evidence(state).log_odds >= threshold) << bit
+                };
+                let naive = cell.iter().enumerate().map(is_from).fold(0, |bits, bit| bits | bit);
+                assert_eq!(bits_of_states(&cell, threshold, &palette), naive, "{threshold}");
+            }
+        }
+    }
 }

@@ -87,13 +87,26 @@ impl BrickDirectory {
     /// [`BrickDirectory::get`] with a known block number.
     #[inline]
     pub(crate) fn in_block(&self, block: u32, at: Address) -> u32 {
-        self.numbers[block as usize][at.brick]
+        self.at_place(block, at.brick)
+    }
+
+    /// Number of the brick at a position of a block; 0 if it is absent.
+    #[inline]
+    pub(crate) fn at_place(&self, block: u32, place: usize) -> u32 {
+        self.numbers[block as usize][place]
     }
 
     /// Marks of the bricks of the block at an address, one bit each in Morton order.
     #[inline]
     pub(crate) fn marks(&self, at: Address) -> u64 {
-        self.marks[self.blocks.get(at.block) as usize]
+        self.marked(at).1
+    }
+
+    /// Number and marks of the block at an address.
+    #[inline]
+    pub(crate) fn marked(&self, at: Address) -> (u32, u64) {
+        let block = self.blocks.get(at.block);
+        (block, self.marks[block as usize])
     }
 
     pub(crate) fn mark(&mut self, at: Address) {

@@ -1,6 +1,7 @@
 use super::brick::Brick;
 use super::brick_directory::{Address, BLOCK_EDGE, BrickDirectory};
 use super::brick_view::BrickView;
+use super::marked_block::MarkedBlock;
 use super::palette::Palette;
 use super::summary::{Summary, larger};
 use crate::octree::write_bt_of_bricks;
@@ -135,13 +136,13 @@ impl Table {
         Some(VoxelBox { min, end: min.map(|k| k.saturating_add(edge)) })
     }
 
-    /// Visits the lowest voxels of bricks that intersect a box and may contain log-odds of at least a threshold.
-    /// Returns `false`, without visiting any, if the table does not track the bricks for this threshold.
+    /// Visits the blocks of bricks that intersect a box and may contain log-odds of at least a threshold. Returns `false`,
+    /// without visiting any, if the table does not track the bricks for this threshold.
     pub(crate) fn visit_marked(
         &self,
         voxels: &VoxelBox,
         threshold: f64,
-        mut visit: impl FnMut(VoxelIndex),
+        mut visit: impl FnMut(MarkedBlock),
     ) -> bool {
         if !Summary::are_marks_for(threshold) {
             return false;
@@ -151,21 +152,21 @@ impl Table {
         for x in along(0) {
             for y in along(1) {
                 for z in along(2) {
-                    let block = [x, y, z];
-                    let mut marks = self.directory.marks(Address::of_key(VoxelKey::from_index(block)));
-                    while marks != 0 {
-                        let place = marks.trailing_zeros();
-                        marks &= marks - 1;
-                        visit(std::array::from_fn(|k| {
-                            // Two bits per coordinate, interleaved.
-                            let steps = (place >> k & 1) | (place >> (k + 3) & 1) << 1;
-                            block[k].saturating_add(BRICK_EDGE * steps as i32)
-                        }));
+                    let min = [x, y, z];
+                    let (number, marks) = self.directory.marked(Address::of_key(VoxelKey::from_index(min)));
+                    if marks != 0 {
+                        visit(MarkedBlock { min, marks, number });
                     }
                 }
             }
         }
         true
+    }
+
+    /// Number of the brick at a position of a block; `None` if it is absent.
+    #[inline]
+    pub(crate) fn number_in_block(&self, block: &MarkedBlock, place: usize) -> Option<u32> {
+        self.directory.at_place(block.number, place).checked_sub(1)
     }
 
     /// Marks a brick if a change may have made voxels occupied; `before` is the bound of its log-odds before the
