@@ -21,7 +21,11 @@ impl Bucket {
 
     /// Transfers bytes, and waits if the device is more than [`SLACK`] behind.
     pub fn take(&self, bytes: usize) {
-        let needed = Duration::from_secs_f64(bytes as f64 / self.bytes_per_s);
+        self.occupy(Duration::from_secs_f64(bytes as f64 / self.bytes_per_s));
+    }
+
+    /// Keeps the device busy, and waits if it is more than [`SLACK`] behind.
+    pub fn occupy(&self, needed: Duration) {
         let done = {
             let mut done = self.done.lock().unwrap_or_else(PoisonError::into_inner);
             *done = (*done).max(Instant::now()) + needed;

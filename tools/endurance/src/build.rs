@@ -29,6 +29,8 @@ pub struct Build {
     pub is_kept: bool,
     /// Whether the digest is computed.
     pub has_digest: bool,
+    /// Whether the process may use one core only.
+    pub is_on_one_core: bool,
     /// Flushes during the build, in addition to the one at the end.
     pub flushes: Option<Flushes>,
 }
@@ -184,6 +186,19 @@ impl Build {
 }
 
 impl Built {
+    /// Wall time of `insert_scan` at a quantile, in milliseconds.
+    pub fn insert_ms(&self, quantile: f64) -> f64 {
+        let mut times: Vec<f64> = self.scans.iter().map(|scan| scan.wall_ms).collect();
+        times.sort_unstable_by(f64::total_cmp);
+        let at = (quantile * times.len() as f64).ceil() as usize;
+        times.get(at.saturating_sub(1)).copied().unwrap_or(f64::NAN)
+    }
+
+    /// Longest call that flushed, in milliseconds.
+    pub fn flush_ms(&self) -> f64 {
+        self.scans.iter().map(|scan| scan.flush_ms).fold(0.0, f64::max)
+    }
+
     /// Wall time of all scans and of the flush, in seconds.
     pub fn wall_s(&self) -> f64 {
         self.scans.iter().map(|scan| scan.wall_ms).sum::<f64>() / 1e3 + self.flush_wall_s
@@ -278,6 +293,7 @@ mod tests {
             folder,
             is_kept: false,
             has_digest: true,
+            is_on_one_core: false,
             flushes: None,
         };
         build.run().unwrap()

@@ -4,6 +4,7 @@ use std::io::{self, Read, Write};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::Duration;
 use voxtile::store::{Disk, DiskLock, DiskRead, DiskWrite, EntryKind, FsDisk, ReaderWatch, Scratch};
 
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -13,8 +14,21 @@ pub enum DiskSpeed {
     /// At most this many bytes a second, reads and writes together. A write waits for its bytes and a sync for all
     /// earlier writes: there is no cache that hides them.
     BytesPerSecond(f64),
+    /// The same, with the delays of a memory card.
+    Card(Card),
     /// No syncs, for measurements that do not depend on time.
     Unsynced,
+}
+
+/// Speed and delays of a memory card.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Card {
+    /// Reads and writes together.
+    pub bytes_per_s: f64,
+    /// Delay of a sync, in seconds. Files that are synced together share it, and so do folders.
+    pub sync_s: f64,
+    /// Delay of a file that is opened or created, or read at a place of its own, in seconds.
+    pub access_s: f64,
 }
 
 /// The file system, with a simulated speed and counters of the bytes read and written.
@@ -30,6 +44,8 @@ pub struct Meter {
     bytes_read: AtomicU64,
     bytes_written: AtomicU64,
     bucket: Option<Bucket>,
+    sync: Duration,
+    access: Duration,
 }
 
 struct Metered<T> {
@@ -41,11 +57,12 @@ struct Metered<T> {
 impl MeteredDisk {
     /// Wraps the file system, at this speed.
     pub fn new(speed: DiskSpeed) -> Self {
-        let bucket = match speed {
-            DiskSpeed::BytesPerSecond(bytes_per_s) => Some(Bucket::new(bytes_per_s)),
+        let card = match speed {
+            DiskSpeed::BytesPerSecond(bytes_per_s) => Some(Card { bytes_per_s, sync_s: 0.0, access_s: 0.0 }),
+            DiskSpeed::Card(card) => Some(card),
             DiskSpeed::Own | DiskSpeed::Unsynced => None,
         };
-        let meter = Arc::new(Meter { bucket, ..Meter::default() });
+        let meter = Arc::new(card.map_or_else(Meter::default, Meter::of));
         Self { meter, is_synced: speed != DiskSpeed::Unsynced }
     }
 
@@ -58,12 +75,21 @@ impl MeteredDisk {
     }
 
     fn sync(&self, path: &Path, sync: impl Fn(&FsDisk, &Path) -> io::Result<()>) -> io::Result<()> {
-        self.meter.drain();
+        self.meter.sync(1);
         if self.is_synced { sync(&FsDisk, path) } else { Ok(()) }
     }
 }
 
 impl Meter {
+    fn of(card: Card) -> Self {
+        Self {
+            bucket: Some(Bucket::new(card.bytes_per_s)),
+            sync: Duration::from_secs_f64(card.sync_s),
+            access: Duration::from_secs_f64(card.access_s),
+            ..Self::default()
+        }
+    }
+
     pub fn bytes_read(&self) -> u64 {
         self.bytes_read.load(Ordering::Relaxed)
     }
@@ -79,9 +105,18 @@ impl Meter {
         }
     }
 
-    fn drain(&self) {
+    /// Waits for all earlier writes and for syncs, one after another.
+    fn sync(&self, syncs: u32) {
         if let Some(bucket) = &self.bucket {
+            bucket.occupy(syncs * self.sync);
             bucket.drain();
+        }
+    }
+
+    /// Waits for the access to a file.
+    fn access(&self) {
+        if let Some(bucket) = &self.bucket {
+            bucket.occupy(self.access);
         }
     }
 }
@@ -114,14 +149,27 @@ impl Write for Metered<Box<dyn DiskWrite>> {
 
 impl DiskWrite for Metered<Box<dyn DiskWrite>> {
     fn sync(&mut self) -> io::Result<()> {
-        self.meter.drain();
+        self.meter.sync(1);
         if self.is_synced { self.file.sync() } else { Ok(()) }
     }
 }
 
 impl Disk for MeteredDisk {
     fn open(&self, path: &Path) -> io::Result<Box<dyn DiskRead>> {
+        self.meter.access();
         Ok(Box::new(self.metered(FsDisk.open(path)?)))
+    }
+
+    fn open_at(&self, path: &Path, offset: u64) -> io::Result<Box<dyn DiskRead>> {
+        self.meter.access();
+        Ok(Box::new(self.metered(FsDisk.open_at(path, offset)?)))
+    }
+
+    fn read_at(&self, path: &Path, offset: u64, bytes: usize) -> io::Result<Vec<u8>> {
+        self.meter.access();
+        let read = FsDisk.read_at(path, offset, bytes)?;
+        self.meter.count(&self.meter.bytes_read, read.len());
+        Ok(read)
     }
 
     fn open_shared(&self, path: &Path) -> io::Result<Box<dyn DiskRead>> {
@@ -133,10 +181,12 @@ impl Disk for MeteredDisk {
     }
 
     fn create(&self, path: &Path) -> io::Result<Box<dyn DiskWrite>> {
+        self.meter.access();
         Ok(Box::new(self.metered(FsDisk.create(path)?)))
     }
 
     fn append(&self, path: &Path, offset: u64) -> io::Result<Box<dyn DiskWrite>> {
+        self.meter.access();
         Ok(Box::new(self.metered(FsDisk.append(path, offset)?)))
     }
 
@@ -149,7 +199,7 @@ impl Disk for MeteredDisk {
     }
 
     fn sync_all(&self, files: &[PathBuf], folders: &[PathBuf]) -> [Vec<io::Result<()>>; 2] {
-        self.meter.drain();
+        self.meter.sync(u32::from(!files.is_empty()) + u32::from(!folders.is_empty()));
         if self.is_synced {
             return FsDisk.sync_all(files, folders);
         }
@@ -192,7 +242,7 @@ impl Disk for MeteredDisk {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::time::{Duration, Instant};
+    use std::time::Instant;
 
     #[test]
     fn bytes_are_counted_and_reads_and_writes_take_time_on_a_slow_disk() {
@@ -209,6 +259,22 @@ mod tests {
         let meter = disk.meter();
         assert_eq!([meter.bytes_written(), meter.bytes_read()], [30_000; 2]);
         assert!(begin.elapsed() >= Duration::from_millis(58), "{:?}", begin.elapsed());
+    }
+
+    #[test]
+    fn a_card_delays_accesses_and_syncs() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("file");
+        let card = Card { bytes_per_s: 1e9, sync_s: 0.02, access_s: 0.01 };
+        let disk = MeteredDisk::new(DiskSpeed::Card(card));
+        let begin = Instant::now();
+        disk.create(&path).unwrap().write_all(&[7; 100]).unwrap();
+        // Files that are synced together share a delay.
+        let [files, folders] = disk.sync_all(&[path.clone(), path.clone()], &[folder.path().to_owned()]);
+        assert_eq!([files.len(), folders.len()], [2, 1]);
+        assert_eq!(disk.read_at(&path, 90, 20).unwrap(), [7; 10]);
+        assert!(begin.elapsed() >= Duration::from_millis(58), "{:?}", begin.elapsed());
+        assert_eq!([disk.meter().bytes_written(), disk.meter().bytes_read()], [100, 10]);
     }
 
     #[test]

@@ -43,6 +43,7 @@ impl Setting {
             folder: self.work.join("map"),
             is_kept: false,
             has_digest: true,
+            is_on_one_core: false,
             flushes: None,
         }
     }

@@ -106,7 +106,14 @@ pub fn do_task() -> Result<()> {
 /// Runs a task in a new process. One malloc arena serves all threads, as in the command `voxtile`.
 fn run_in_child<T: DeserializeOwned>(task: &Task) -> Result<T> {
     let program = std::env::current_exe().context("cannot find this program")?;
-    let mut command = Command::new(program);
+    let mut command = match task {
+        Task::Build(build) if build.is_on_one_core => {
+            let mut command = Command::new("taskset");
+            command.args(["--cpu-list", "0"]).arg(program);
+            command
+        }
+        _ => Command::new(program),
+    };
     command.arg(TASK_ARGUMENT).env("MALLOC_ARENA_MAX", "1");
     let mut child =
         command.stdin(Stdio::piped()).stdout(Stdio::piped()).spawn().context("cannot start a process")?;

@@ -56,14 +56,19 @@ pub fn answer(setting: &Setting) -> Result<Findings> {
     for pair in runs.chunks(2) {
         let [blocking, background] = pair else { continue };
         let disk = background.disk;
-        let by_median = background.insert_ms(0.999) / background.insert_ms(0.5);
+        let by_median = background.built.insert_ms(0.999) / background.built.insert_ms(0.5);
         let cpu = background.built.cpu_s() / blocking.built.cpu_s();
         let promise = |what: &str, found, wanted, unit| {
             Promise::about_time(format!("{disk}: {what}"), found, Wanted::AtMost(wanted), unit)
         };
         findings.promises.extend([
             promise("p99.9 of a scan by the median", by_median, MAX_BY_MEDIAN, ""),
-            promise("longest call", background.insert_ms(1.0).max(background.flush_ms()), MAX_MS, "ms"),
+            promise(
+                "longest call",
+                background.built.insert_ms(1.0).max(background.built.flush_ms()),
+                MAX_MS,
+                "ms",
+            ),
             promise("CPU time, background flushes by blocking ones", cpu, MAX_CPU, ""),
         ]);
         let differ = f64::from(u8::from(blocking.built.digest != background.built.digest));
@@ -72,21 +77,6 @@ pub fn answer(setting: &Setting) -> Result<Findings> {
     }
     findings.answer.tables = vec![table(&case.description(), &runs)];
     Ok(findings)
-}
-
-impl Run {
-    /// Wall time of `insert_scan` at a quantile, in milliseconds.
-    fn insert_ms(&self, quantile: f64) -> f64 {
-        let mut times: Vec<f64> = self.built.scans.iter().map(|scan| scan.wall_ms).collect();
-        times.sort_unstable_by(f64::total_cmp);
-        let at = (quantile * times.len() as f64).ceil() as usize;
-        times.get(at.saturating_sub(1)).copied().unwrap_or(f64::NAN)
-    }
-
-    /// Longest call that flushed, in milliseconds.
-    fn flush_ms(&self) -> f64 {
-        self.built.scans.iter().map(|scan| scan.flush_ms).fold(0.0, f64::max)
-    }
 }
 
 fn table(case: &str, runs: &[Run]) -> Table {
@@ -111,11 +101,11 @@ fn table(case: &str, runs: &[Run]) -> Table {
         table.push([
             of.disk.into(),
             if of.is_background { "background" } else { "blocking" }.into(),
-            Cell::Number(of.insert_ms(0.5), 1),
-            Cell::Number(of.insert_ms(0.99), 1),
-            Cell::Number(of.insert_ms(0.999), 1),
-            Cell::Number(of.insert_ms(1.0), 1),
-            Cell::Number(of.flush_ms(), 1),
+            Cell::Number(of.built.insert_ms(0.5), 1),
+            Cell::Number(of.built.insert_ms(0.99), 1),
+            Cell::Number(of.built.insert_ms(0.999), 1),
+            Cell::Number(of.built.insert_ms(1.0), 1),
+            Cell::Number(of.built.flush_ms(), 1),
             Cell::Number(of.built.cpu_s(), 1),
             Cell::Number(mib(of.built.peak_resident_bytes as f64), 0),
             Cell::Count(of.built.tiles),
