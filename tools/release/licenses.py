@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Prints the licenses of all crates in the binaries of some packages: licenses.py TARGET FEATURES PACKAGE...
+"""Prints the licenses of the font and all crates in the binaries of some packages: licenses.py TARGET FEATURES PACKAGE...
 
 Most licenses require their text next to the binary. Crates with the same text are listed together above it.
 """
@@ -52,6 +52,8 @@ def main(target, features, *packages):
             named.setdefault(" ".join(text.split()), (text, []))[1].append(name)
         if not found:
             without.append(name)
+    font = pathlib.Path(__file__).parents[2] / "crates/render/assets/LICENSE-OFL"
+    print(section(["The font of the pictures (OFL-1.1)"], font.read_text(encoding="utf-8").strip()))
     if target.endswith("-musl"):
         print(MUSL)
     for text, names in sorted(named.values(), key=lambda entry: entry[1]):

@@ -29,7 +29,7 @@ pub use edit::{ClearArgs, CropArgs, DecayArgs, MergeArgs};
 pub use export::{ExportArgs, WhatName};
 pub use local::{LocalArgs, PresetName};
 use log::LevelFilter;
-pub use picture::{PictureArgs, ReportArgs, ViewName};
+pub use picture::{BackgroundName, PictureArgs, ReportArgs, ViewName};
 pub use read::{FrameName, ReadArgs, ReturnsName};
 pub use remap::{RemapArgs, RemovePointsArgs, RemoveScansArgs, ReplayArgs};
 pub use snapshot::{DiffArgs, RevertArgs, SnapshotArgs, SnapshotsArgs};

@@ -35,7 +35,7 @@ mod survey;
 pub use color_map::ColorMap;
 pub use layer::Layer;
 pub use picture::{
-    Change, ColorBy, Drawing, Drawn, Image, OverTime, Panel, Picture, SideAxis, View, colors, is_unix_time,
-    time_labels,
+    Background, Change, ColorBy, Drawing, Drawn, Image, OverTime, Panel, Picture, SideAxis, View, colors,
+    is_unix_time, time_labels,
 };
 pub use survey::{HeightBin, Survey};

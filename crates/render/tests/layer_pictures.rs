@@ -92,7 +92,7 @@ fn classes_have_fixed_colors() {
     // The legend has their colors and names: it is wider and higher than that of heights.
     let map = map_of(ALL, &scene());
     let [height, class] = [ColorBy::Height, ColorBy::Layer(Layer::Class)]
-        .map(|color| draw(&Picture::new().with_color(color), &map).image);
+        .map(|color| draw(&Picture::new().with_grid(false).with_color(color), &map).image);
     assert!(class.height_px() > height.height_px());
     let count = |color: [u8; 3]| class.rgba().chunks(4).filter(|pixel| pixel[..3] == color).count();
     for color in [class_color(5), class_color(6), class_color(9), class_color(19), colors::NO_VALUE] {

@@ -6,7 +6,7 @@ use voxtile::scan::PointBatch;
 use voxtile::space::{Aabb, Point, TileBox};
 use voxtile::{InMemoryMapper, MapConfig, Mapper, Result, Scan, TileIndex};
 use voxtile_distance::DistanceOptions;
-use voxtile_render::{ColorBy, Drawn, Image, Picture, SideAxis, Survey, View, colors};
+use voxtile_render::{Background, ColorBy, Drawn, Image, Picture, SideAxis, Survey, View, colors};
 
 const RESOLUTION_M: f64 = 0.5;
 
@@ -394,4 +394,46 @@ fn classes_of_a_comparison_hide_each_other_in_order() {
     let mut drawing = picture.start_comparison(&config, empty).unwrap();
     drawing.add_compared([0; 3], VoxelClass::Appeared, false);
     assert_eq!(drawing.finish().region_m, None);
+}
+
+/// Returns the alpha in a cell.
+fn alpha(drawn: &Drawn, [across, up]: [usize; 2]) -> u8 {
+    let [left, top, _, height] = drawn.map_px;
+    let [x, y] = [left + across * drawn.cell_px + 1, top + height - 1 - up * drawn.cell_px - 1];
+    drawn.image.rgba()[4 * (x + y * drawn.image.width_px()) + 3]
+}
+
+#[test]
+fn backgrounds_have_their_colors() {
+    let on = |background| draw(&plain().with_background(background), &wall());
+    for (background, unknown) in
+        [(Background::Dark, colors::UNKNOWN), (Background::Black, [0; 3]), (Background::White, [255; 3])]
+    {
+        let drawn = on(background);
+        assert_eq!(cell(&drawn, [5, 1]), unknown);
+        assert_eq!(cell(&drawn, [5, 3]), colors::color_of(0.0));
+        assert_ne!(cell(&drawn, [0, 0]), unknown, "free space");
+        assert_eq!(alpha(&drawn, [5, 1]), 255);
+    }
+    let clear = on(Background::Transparent);
+    assert_eq!([[5, 1], [5, 3], [0, 0]].map(|at| alpha(&clear, at)), [0, 255, 255]);
+    assert_eq!(cell(&clear, [0, 0]), cell(&on(Background::White), [0, 0]));
+}
+
+#[test]
+fn pictures_of_print_size_have_its_resolution_and_type() {
+    let map = map_of(&[center([0; 3]), center([9_999, 3, 0])], &[]);
+    let picture = Picture::new().with_size_px([10_000; 2]);
+    let (page, print) = (draw(&picture, &map), draw(&picture.with_dpi(Some(600.0)), &map));
+    assert_eq!((page.cell_px, page.map_px[2]), (1, 10_000));
+    // By default as wide as a page.
+    assert!((10_000.0 / page.image.dpi() - 6.7).abs() < 1e-9);
+    let mut png = Vec::new();
+    print.image.write_png(&mut png).unwrap();
+    let reader = png::Decoder::new(std::io::Cursor::new(&png)).read_info().unwrap();
+    assert_eq!(reader.info().pixel_dims.map(|dims| [dims.xppu, dims.yppu]), Some([23_622; 2]));
+    // The rest is title and legend, whose height is in points.
+    let points =
+        |drawn: &Drawn| (drawn.image.height_px() - drawn.map_px[3]) as f64 / drawn.image.dpi() * 72.0;
+    assert!((points(&page) - points(&print)).abs() < 0.5, "{} and {}", points(&page), points(&print));
 }

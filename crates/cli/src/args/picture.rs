@@ -1,6 +1,8 @@
 use super::{ColorName, help};
+use clap::builder::{PossibleValue, PossibleValuesParser};
 use clap::{Args, ValueEnum};
 use std::path::PathBuf;
+use voxtile_render::ColorMap;
 
 #[derive(Debug, Args)]
 #[command(allow_negative_numbers = true)]
@@ -27,11 +29,20 @@ pub struct PictureArgs {
     pub max_distance: f64,
     #[arg(long, value_name = "WHAT", default_value = "height", help = help::COLOR)]
     pub color: ColorName,
+    /// Colors of the values [default: voxtile]
+    #[arg(long, value_name = "NAME", value_parser = color_map_names(), conflicts_with = "since")]
+    pub color_map: Option<String>,
     #[arg(long, value_names = ["X0", "Y0", "Z0", "X1", "Y1", "Z1"], num_args = 6, help = help::VOXELS_IN_BOX)]
     pub region: Option<Vec<f64>>,
-    /// Maximum length of the map's longer edge, in pixels, 16 to 8192
-    #[arg(long, value_name = "PIXELS", default_value = "2048", value_parser = clap::value_parser!(u16).range(16..=8192))]
+    /// Maximum length of the map's longer edge, in pixels, 16 to 16384
+    #[arg(long, value_name = "PIXELS", default_value = "2048", value_parser = clap::value_parser!(u16).range(16..=16384))]
     pub size: u16,
+    /// Resolution in pixels per inch, 10 to 10000: type and lines have the size of print [default: that of a picture 17
+    /// cm wide]
+    #[arg(long, value_name = "DPI", value_parser = clap::value_parser!(u16).range(10..=10_000))]
+    pub dpi: Option<u16>,
+    #[arg(long, value_name = "COLOR", default_value = "dark", help = "Color of unknown space and margins")]
+    pub background: BackgroundName,
     /// Draw no tile borders
     #[arg(long)]
     pub no_grid: bool,
@@ -48,6 +59,11 @@ pub struct PictureArgs {
     pub json: bool,
 }
 
+/// Names and purposes of all color maps.
+fn color_map_names() -> PossibleValuesParser {
+    ColorMap::all().iter().map(|map| PossibleValue::new(map.name).help(map.purpose)).into()
+}
+
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum ViewName {
     /// From above: x to the right, y up
@@ -56,6 +72,18 @@ pub enum ViewName {
     SideX,
     /// From a side: y to the right, z up
     SideY,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum BackgroundName {
+    /// Nearly black, for screens
+    Dark,
+    /// Black, for screens
+    Black,
+    /// White, for print
+    White,
+    /// None, with the dark type of white
+    Transparent,
 }
 
 #[derive(Debug, Args)]

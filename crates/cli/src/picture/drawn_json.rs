@@ -15,9 +15,12 @@ pub struct DrawnJson {
     slice_m: Option<f64>,
     /// `None` for a picture of changes.
     color: Option<String>,
+    color_map: Option<String>,
     since: Option<String>,
     width_px: usize,
     height_px: usize,
+    /// Pixels per inch.
+    dpi: f64,
     /// Map's rectangle in the image: left, top, width, height.
     map_px: [usize; 4],
     region_m: Option<Aabb>,
@@ -48,9 +51,11 @@ impl DrawnJson {
                 Some(_) => Some("distance".to_owned()),
                 None => args.since.is_none().then(|| color_name(args.color)),
             },
+            color_map: args.color_map.clone(),
             since: args.since.as_ref().map(|since| since.display().to_string()),
             width_px: drawn.image.width_px(),
             height_px: drawn.image.height_px(),
+            dpi: drawn.image.dpi(),
             map_px: drawn.map_px,
             region_m: drawn.region_m,
             cell_m: drawn.cell_m,

@@ -3,7 +3,7 @@
 mod drawn_json;
 mod moving;
 
-use crate::args::{ColorName, PictureArgs, ViewName};
+use crate::args::{BackgroundName, ColorName, PictureArgs, ViewName};
 use crate::json;
 use crate::part::region_of;
 use crate::progress::Progress;
@@ -22,7 +22,9 @@ use voxtile_distance::DistanceOptions;
 use voxtile_pipeline::output::{OutputFile, is_standard_output};
 use voxtile_pipeline::{AnyMap, read_any_map};
 use voxtile_render::classes::class_label;
-use voxtile_render::{ColorBy, Drawing, Drawn, Layer, Picture, SideAxis, View, time_labels};
+use voxtile_render::{
+    Background, ColorBy, ColorMap, Drawing, Drawn, Layer, Picture, SideAxis, View, time_labels,
+};
 
 /// Draws a map and prints a summary, to standard error if the picture is written to standard output. `is_quiet`
 /// suppresses the summary.
@@ -129,6 +131,17 @@ impl From<ColorName> for ColorBy {
     }
 }
 
+impl From<BackgroundName> for Background {
+    fn from(name: BackgroundName) -> Self {
+        match name {
+            BackgroundName::Dark => Self::Dark,
+            BackgroundName::Black => Self::Black,
+            BackgroundName::White => Self::White,
+            BackgroundName::Transparent => Self::Transparent,
+        }
+    }
+}
+
 fn picture_of(args: &PictureArgs) -> Result<Picture> {
     let view = match (args.slice.or(args.distance_slice), args.from) {
         (Some(z_m), ViewName::Above) => View::Slice { z_m, thickness_m: args.thickness.unwrap_or(0.0) },
@@ -144,7 +157,15 @@ fn picture_of(args: &PictureArgs) -> Result<Picture> {
     };
     let size_px = [usize::from(args.size); 2];
     let mut picture = Picture::new().with_view(view).with_color(args.color.into()).with_size_px(size_px);
-    picture = picture.with_grid(!args.no_grid);
+    picture = picture.with_grid(!args.no_grid).with_background(args.background.into());
+    picture = picture.with_dpi(args.dpi.map(f64::from));
+    if let Some(color_map) = args.color_map.as_deref().and_then(ColorMap::named) {
+        if matches!(args.color, ColorName::Rgb | ColorName::Class) {
+            let reason = "--color rgb and --color class have their own colors; omit one of both";
+            return Err(Error::argument("--color-map", reason));
+        }
+        picture = picture.with_color_map(color_map);
+    }
     if let Some(region) = &args.region {
         picture = picture.with_region(region_of(region)?);
     }
@@ -200,6 +221,9 @@ fn caption(args: &PictureArgs, drawn: &Drawn, marked: Option<u64>) -> String {
         ViewName::SideY => [1, 2],
     };
     let [across, up] = axes.map(|axis| region.max[axis] - region.min[axis]);
+    let is_diverging =
+        args.color_map.as_deref().and_then(ColorMap::named).is_some_and(|map| map.is_diverging);
+    let dark = if is_diverging { "" } else { " (dark)" };
     let scale = match (drawn.range, args.color) {
         (None, ColorName::Class) if args.since.is_none() && !drawn.classes.is_empty() => {
             let labels: Vec<_> = drawn.classes.iter().map(|(class, _)| class_label(*class)).collect();
@@ -207,16 +231,16 @@ fn caption(args: &PictureArgs, drawn: &Drawn, marked: Option<u64>) -> String {
         }
         (None, _) => String::new(),
         (Some([.., most]), _) if args.distance_slice.is_some() => {
-            format!("; distance 0 m (dark) to {most} m")
+            format!("; distance 0 m{dark} to {most} m")
         }
-        (Some([least, most]), ColorName::Height) => format!("; height {least:.1} m (dark) to {most:.1} m"),
-        (Some([least, most]), ColorName::Probability) => format!("; probability {least} (dark) to {most}"),
-        (Some([least, most]), ColorName::Count) => format!("; count {least:.0} (dark) to {most:.0}"),
-        (Some([least, most]), ColorName::LastScan) => format!("; last scan {least:.0} (dark) to {most:.0}"),
-        (Some([least, most]), ColorName::Intensity) => format!("; intensity {least:.1} (dark) to {most:.1}"),
+        (Some([least, most]), ColorName::Height) => format!("; height {least:.1} m{dark} to {most:.1} m"),
+        (Some([least, most]), ColorName::Probability) => format!("; probability {least}{dark} to {most}"),
+        (Some([least, most]), ColorName::Count) => format!("; count {least:.0}{dark} to {most:.0}"),
+        (Some([least, most]), ColorName::LastScan) => format!("; last scan {least:.0}{dark} to {most:.0}"),
+        (Some([least, most]), ColorName::Intensity) => format!("; intensity {least:.1}{dark} to {most:.1}"),
         (Some(range), ColorName::Age) => {
             let [first, last] = time_labels(range);
-            format!("; last hit {first} (dark) to {last}")
+            format!("; last hit {first}{dark} to {last}")
         }
         (Some(_), ColorName::Rgb | ColorName::Class) => String::new(),
     };

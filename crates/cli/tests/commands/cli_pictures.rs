@@ -54,6 +54,31 @@ fn a_picture_matches_its_json() {
         assert!(left + wide <= width && top + high <= height, "{printed}");
         assert!(wide.max(high) <= if more.contains(&"--size") { 300 } else { 2048 }, "{printed}");
     }
+    let [cividis, gray] = ["cividis", "gray"].map(|name| {
+        let printed = json(&["picture", text(&map), "-o", text(&file), "--color-map", name, "--json"]);
+        assert_eq!(printed["color_map"], name);
+        pixels_of(&file).2
+    });
+    let printed = json(&[
+        "picture",
+        text(&map),
+        "-o",
+        text(&file),
+        "--dpi",
+        "300",
+        "--background",
+        "transparent",
+        "--json",
+    ]);
+    let bytes = fs::read(&file).unwrap();
+    let reader = png::Decoder::new(std::io::Cursor::new(&bytes)).read_info().unwrap();
+    let info = reader.info();
+    assert_eq!(info.pixel_dims.map(|dims| (dims.xppu, dims.unit)), Some((11_811, png::Unit::Meter)));
+    assert_eq!((info.color_type, printed["dpi"].as_f64()), (png::ColorType::Rgba, Some(300.0)));
+    // The legend has the highest color even if the map is dark.
+    let highest = |name: &str| voxtile_render::ColorMap::named(name).unwrap().color_of(1.0);
+    assert!(cividis.contains(&highest("cividis")) && !cividis.contains(&highest("gray")));
+    assert!(gray.contains(&highest("gray")) && !gray.contains(&highest("cividis")));
     // On standard output; the summary is on standard error.
     let run = voxtile(&["picture", text(&map), "-o", "-", "--json"]).assert().success();
     let bytes = run.get_output();
@@ -90,7 +115,9 @@ fn points_marked_as_moving_are_drawn() {
     let folder = TempDir::new().unwrap();
     let (moved, file) = (map_with_a_passer_by(folder.path()).0, folder.path().join("moved.png"));
     let (moved, file) = (text(&moved), text(&file));
-    let draw = |more: &[&str]| json(&[&["picture", moved, "-o", file, "--json"][..], more].concat());
+    // With swatches of one size.
+    let always = ["picture", moved, "-o", file, "--json", "--dpi", "100"];
+    let draw = |more: &[&str]| json(&[&always[..], more].concat());
     let red = || {
         let (.., pixels) = pixels_of(Path::new(file));
         pixels.iter().filter(|&&pixel| pixel == voxtile_render::colors::MOVING).count()
@@ -150,7 +177,15 @@ fn impossible_pictures_are_refused() {
     let (code, error) =
         failure(&["picture", text(&map), "-o", text(&file), "--slice", "1", "--from", "side-x"]);
     assert!(code == 2 && error.contains("--slice"), "{error}");
-    for wrong in [&["--slice", "nan"][..], &["--region", "1", "1", "1", "0", "2", "2"], &["--size", "9000"]] {
+    for wrong in [
+        &["--slice", "nan"][..],
+        &["--region", "1", "1", "1", "0", "2", "2"],
+        &["--size", "17000"],
+        &["--dpi", "1"],
+        &["--color-map", "turbo"],
+        &["--color-map", "gray", "--since", text(&map)],
+        &["--color-map", "gray", "--color", "rgb"],
+    ] {
         let (code, _) = failure(&[&["picture", text(&map), "-o", text(&file)], wrong].concat());
         assert_eq!(code, 2, "{wrong:?}");
     }

@@ -1,12 +1,13 @@
 use super::canvas::Canvas;
 use super::cells::{Cell, Cells, Rank};
 use super::collect::{Collected, Content, Known};
-use super::drawing::{Drawing, Pane};
-use super::font;
+use super::drawing::Drawing;
 use super::frame::Frame;
 use super::legend::Entry;
+use super::measure::Measure;
 use super::options::Picture;
 use super::palette::{self, Rgb};
+use super::pane::Pane;
 use voxtile::space::{Aabb, VoxelBox, VoxelIndex};
 use voxtile::{MapConfig, Result};
 use voxtile_compare::VoxelClass;
@@ -100,21 +101,22 @@ impl Drawing<'_> {
 
 impl ComparedBox {
     /// Draws the box around its cells, which remain visible.
-    pub fn draw(&self, canvas: &mut Canvas, frame: &Frame, pane: &Pane, resolution_m: f64, dot: usize) {
+    pub fn draw(&self, canvas: &mut Canvas, frame: &Frame, pane: &Pane, resolution_m: f64, measure: Measure) {
         let [low, high] =
             [self.bounds_m.min, self.bounds_m.max].map(|corner| frame.position_of(corner, resolution_m));
         let ([left, bottom], [right, top]) = (pane.corner_px(low), pane.corner_px(high));
-        let gap = 2 * dot;
+        let gap = measure.px(1.8);
         let (left, top) = (left.saturating_sub(gap), top.saturating_sub(gap));
         let size = [right + gap - left, bottom + gap - top];
-        let line = dot.div_ceil(2);
+        let line = measure.px(0.7);
         canvas.fill(left, top, [size[0], line], palette::INK, 1.0);
         canvas.fill(left, top + size[1] - line, [size[0], line], palette::INK, 1.0);
         canvas.fill(left, top, [line, size[1]], palette::INK, 1.0);
         canvas.fill(left + size[0] - line, top, [line, size[1]], palette::INK, 1.0);
-        let label = [font::width_of(&self.label), font::HEIGHT].map(|dots| (dots + 2) * dot);
-        let above = top.saturating_sub(label[1]);
-        canvas.fill(left, above, label, palette::UNKNOWN, 0.75);
-        canvas.text(left + dot, above + dot, dot, palette::INK, &self.label);
+        let (label, space) = (measure.label(), measure.px(1.5));
+        let size = [label.width_of(&self.label), label.height()].map(|edge| edge + 2 * space);
+        let above = top.saturating_sub(size[1]);
+        canvas.fill(left, above, size, palette::UNKNOWN, 0.75);
+        canvas.text(left + space, above + space, label, palette::INK, &self.label);
     }
 }

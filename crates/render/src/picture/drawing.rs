@@ -2,14 +2,18 @@ use super::canvas::Canvas;
 use super::cells::{Cell, Rank};
 use super::collect::{Collected, Content, Known, seen};
 use super::compared::{ComparedBox, color_of_rank, legend_entries};
-use super::font;
 use super::image::Image;
 use super::layer_cells::LayerValue;
-use super::legend::{Entry, Legend, Scale, legend_height, moving_entry};
+use super::layout::Layout;
+use super::legend::{Entry, Legend, Pen, Scale, moving_entry};
+use super::measure::Measure;
 use super::moving::Moving;
 use super::options::Picture;
-use super::palette::{self, Rgb, color_of, lit, mixed};
+use super::palette::{self, Rgb, lit, mixed};
+use super::pane::Pane;
+use super::theme::Theme;
 use super::time_labels::short_time_labels;
+use super::trajectory::draw_trajectory;
 use super::view::{Change, ColorBy};
 use crate::Layer;
 use crate::classes::{class_color, class_label};
@@ -51,72 +55,35 @@ pub struct Drawn {
     pub unread: Vec<TileIndex>,
 }
 
-/// Visible cells and their position in the image.
-pub(super) struct Pane {
-    first: [usize; 2],
-    cells: [usize; 2],
-    /// Edge length of a cell in pixels.
-    pub zoom: usize,
-    left: usize,
-    top: usize,
-}
-
 /// A picture whose tiles are read. Points can be added before it is finished.
 pub struct Drawing<'a> {
     picture: &'a Picture,
     grid: Grid,
     layers: Layers,
+    has_crs: bool,
     pub(super) collected: Collected,
     range: Option<[f64; 2]>,
     moving: Option<Moving>,
     pub(super) boxes: Vec<ComparedBox>,
 }
 
-/// Minimum width of the legend.
-const MIN_WIDTH: usize = 760;
 /// Maximum size of a voxel in pixels, for small maps.
 const LARGEST_ZOOM: usize = 48;
 const SECONDS_A_NS: f64 = 1e-9;
 /// Size of an image without a map.
-const EMPTY_SIZE: [usize; 2] = [MIN_WIDTH, 240];
-
-impl Pane {
-    fn size(&self) -> [usize; 2] {
-        self.cells.map(|n| n * self.zoom)
-    }
-
-    /// Returns the upper left pixel of a cell; rows are numbered downwards.
-    pub fn pixel(&self, [across, up]: [usize; 2]) -> [usize; 2] {
-        let row = self.cells[1] - 1 - (up - self.first[1]);
-        [self.left + (across - self.first[0]) * self.zoom, self.top + row * self.zoom]
-    }
-
-    /// Returns the distance of a position in cells from the lower left corner, in pixels.
-    fn offset_px(&self, position: [f64; 2]) -> [f64; 2] {
-        std::array::from_fn(|k| (position[k] - self.first[k] as f64) * self.zoom as f64)
-    }
-
-    /// Returns the pixel at a corner of cells, moved to the border if it is outside.
-    pub fn corner_px(&self, position: [f64; 2]) -> [usize; 2] {
-        let (at, size) = (self.offset_px(position), self.size());
-        let [across, up] = [0, 1].map(|k| at[k].round().clamp(0.0, size[k] as f64) as usize);
-        [self.left + across, self.top + size[1] - up]
-    }
-
-    /// Returns the pixel of a position in cells, if it is inside.
-    fn pixel_of(&self, position: [f64; 2]) -> Option<[usize; 2]> {
-        let at = self.offset_px(position);
-        let size = self.size();
-        let is_inside = (0..2).all(|k| at[k] >= 0.0 && at[k] < size[k] as f64);
-        is_inside.then(|| [self.left + at[0] as usize, self.top + size[1] - 1 - at[1] as usize])
-    }
-}
+const EMPTY_SIZE: [usize; 2] = [760, 240];
+/// Width of grid lines in points.
+const LINE_PT: f64 = 0.25;
+/// Names of the axes.
+pub(super) const AXES: [&str; 3] = ["x", "y", "z"];
 
 impl<'a> Drawing<'a> {
     pub(super) fn new(picture: &'a Picture, config: &MapConfig, collected: Collected) -> Self {
         let (grid, layers) = (config.grid, config.layers());
         let boxes = Vec::new();
-        let mut drawing = Self { picture, grid, layers, collected, range: None, moving: None, boxes };
+        let has_crs = config.crs.is_some();
+        let mut drawing =
+            Self { picture, grid, layers, has_crs, collected, range: None, moving: None, boxes };
         drawing.range = drawing.range();
         drawing
     }
@@ -141,38 +108,53 @@ impl<'a> Drawing<'a> {
         let entries = self.entries(&classes, cells_without_value);
         let layout = Layout::of(self.picture, size, &entries);
         let pane = Pane { first, cells, zoom, left: layout.left, top: layout.top };
-        let mut canvas = Canvas::new(layout.width, layout.height, palette::UNKNOWN);
+        let (theme, measure) = (self.theme(), layout.measure);
+        let mut canvas = Canvas::new(layout.width, layout.height, &theme);
         self.draw_cells(&mut canvas, &known, &pane);
         let cell_m = known.frame.voxels_a_cell as f64 * self.grid.resolution_m();
         let pixels_a_metre = zoom as f64 / cell_m;
         let lines_m = self.picture.has_grid.then(|| self.line_spacing_m(pixels_a_metre));
         if let Some(every_m) = lines_m {
-            self.draw_tile_lines(&mut canvas, &known, &pane, every_m);
+            self.draw_tile_lines(&mut canvas, &known, &pane, every_m, measure.px(LINE_PT));
         }
         if let Some(moving) = &self.moving {
-            moving.draw(&mut canvas, &known.frame, &pane);
+            moving.draw(&mut canvas, &known.frame, &pane, theme.ink);
         }
-        self.draw_path(&mut canvas, &known, &pane, layout.dot);
+        let resolution_m = self.grid.resolution_m();
+        let color = if self.collected.content == Content::Values { theme.path } else { theme.ink };
+        draw_trajectory(
+            &mut canvas,
+            self.picture,
+            &known,
+            &pane,
+            resolution_m,
+            measure,
+            [color, theme.ground],
+        );
         for of_change in &self.boxes {
-            of_change.draw(&mut canvas, &known.frame, &pane, self.grid.resolution_m(), layout.dot);
+            of_change.draw(&mut canvas, &known.frame, &pane, resolution_m, measure);
         }
         if self.picture.has_legend {
-            canvas.text(layout.margin, layout.margin, layout.dot, palette::INK, &self.title(&layout));
+            let title = measure.title().fitted(&self.picture.title, layout.width - 2 * layout.margin);
+            canvas.text(layout.margin, layout.margin, measure.title(), theme.ink, &title);
+            let axes = self.picture.view.axes();
             let legend = Legend {
                 metres_a_pixel: 1.0 / pixels_a_metre,
                 lines_m,
-                axes: self.picture.view.axes(),
+                axes: vec![(AXES[axes[0]], [1.0, 0.0]), (AXES[axes[1]], [0.0, -1.0])],
+                has_north: self.has_crs,
                 has_path: !self.picture.path.is_empty(),
+                has_space: self.collected.content != Content::Comparison,
                 scale: self.scale(),
                 entries,
             };
-            legend.draw(&mut canvas, layout.foot, layout.dot);
+            legend.draw(&mut Pen { canvas: &mut canvas, foot: layout.foot, measure, theme: &theme });
         }
         let voxels = known.frame.voxels_of(first, cells);
         let corner_m = |voxel: [i32; 3]| voxel.map(|index| self.grid.corner_m(index));
         let count = |from: Rank| known.cells.iter().filter(|cell| cell.rank >= from).count() as u64;
         Drawn {
-            image: canvas.into_image(),
+            image: canvas.into_image(measure.dpi()),
             map_px: [pane.left, pane.top, size[0], size[1]],
             region_m: Some(Aabb { min: corner_m(voxels.min), max: corner_m(voxels.end) }),
             cell_m,
@@ -200,16 +182,19 @@ impl<'a> Drawing<'a> {
 
     /// Draws a picture without cells.
     fn draw_nothing(self) -> Drawn {
+        let measure = Measure::of(EMPTY_SIZE, self.picture.dpi);
         let size = if self.picture.has_legend { EMPTY_SIZE } else { [1; 2] };
-        let mut canvas = Canvas::new(size[0], size[1], palette::UNKNOWN);
+        let theme = self.theme();
+        let mut canvas = Canvas::new(size[0], size[1], &theme);
         if self.picture.has_legend {
-            canvas.text(20, 20, 2, palette::INK, &self.picture.title);
-            let text = "no observed voxels here";
-            let left = (size[0] - 2 * font::width_of(text)) / 2;
-            canvas.text(left, size[1] / 2, 2, palette::FAINT_INK, text);
+            let title = measure.title().fitted(&self.picture.title, size[0] - 40);
+            canvas.text(20, 20, measure.title(), theme.ink, &title);
+            let (text, label) = ("no observed voxels here", measure.label());
+            let left = size[0].saturating_sub(label.width_of(text)) / 2;
+            canvas.text(left, size[1] / 2, label, theme.faint_ink, text);
         }
         Drawn {
-            image: canvas.into_image(),
+            image: canvas.into_image(measure.dpi()),
             map_px: [0; 4],
             region_m: None,
             cell_m: self.grid.resolution_m(),
@@ -225,14 +210,17 @@ impl<'a> Drawing<'a> {
         }
     }
 
-    fn title(&self, layout: &Layout) -> String {
-        let letters = (layout.width - 2 * layout.margin) / (font::ADVANCE * layout.dot);
-        self.picture.title.chars().take(letters).collect()
+    fn theme(&self) -> Theme {
+        Theme::of(self.picture.background)
     }
 
     fn scale(&self) -> Scale {
         match self.collected.content {
-            Content::Values => Scale::Values { color_by: self.picture.color_by, range: self.range },
+            Content::Values => Scale::Values {
+                color_by: self.picture.color_by,
+                color_map: self.picture.color_map,
+                range: self.range,
+            },
             Content::Difference => Scale::Change,
             Content::Comparison => Scale::Comparison,
         }
@@ -270,7 +258,7 @@ impl<'a> Drawing<'a> {
         if let (ColorBy::Layer(Layer::Time), Some(range)) = (self.picture.color_by, self.range)
             && let (_, Some(date)) = short_time_labels(range)
         {
-            entries.push(Entry { color: None, label: format!("last hit: {date} utc") });
+            entries.push(Entry { color: None, label: format!("last hit: {date} UTC") });
         }
         entries.extend(self.moving.as_ref().map(|moving| moving_entry(moving.points)));
         entries
@@ -300,7 +288,7 @@ impl<'a> Drawing<'a> {
         Some([values[least], values[most].max(values[least] + apart)])
     }
 
-    /// Returns the values of the first and the last color. Up to 1 % of the cells at either end may be outside the
+    /// Returns the values of the first and the last color. Up to 2 % of the cells at either end may be outside the
     /// range.
     ///
     /// Probabilities always have the same range, so that pictures can be compared.
@@ -316,7 +304,8 @@ impl<'a> Drawing<'a> {
         let cells = known.cells.iter().filter(|cell| cell.rank >= least);
         let mut values: Vec<f32> = cells.map(|cell| cell.value).collect();
         values.sort_unstable_by(f32::total_cmp);
-        let (least, most) = (values.get(values.len() / 100)?, values.get(values.len() * 99 / 100)?);
+        let few = values.len() / 50;
+        let (least, most) = (values.get(few)?, values.get(values.len().checked_sub(1 + few)?)?);
         let apart = if self.picture.color_by == ColorBy::Height { 0.01 } else { 1.0 };
         Some([f64::from(*least), f64::from(*most).max(f64::from(*least) + apart)])
     }
@@ -338,12 +327,13 @@ impl<'a> Drawing<'a> {
     fn color(&self, known: &Known, at: [usize; 2], cell: Cell) -> Option<Rgb> {
         let color_by_value = |value: f64| {
             let [least, most] = self.range.unwrap_or([0.0, 1.0]);
-            color_of(match self.picture.color_by {
+            self.picture.color_map.color_of(match self.picture.color_by {
                 // Logarithmic: most voxels have few observations, some have very many.
                 ColorBy::Count => ((value + 1.0) / (least + 1.0)).ln() / ((most + 1.0) / (least + 1.0)).ln(),
                 _ => (value - least) / (most - least),
             })
         };
+        let theme = self.theme();
         let value_color = || color_by_value(f64::from(cell.value));
         match cell.rank {
             Rank::Unknown => None,
@@ -351,7 +341,7 @@ impl<'a> Drawing<'a> {
             Rank::Changed(Change::Vanished) => Some(palette::VANISHED),
             Rank::Changed(Change::Appeared) => Some(palette::APPEARED),
             Rank::Compared(class) | Rank::InFront(class) => color_of_rank(class),
-            Rank::Occupied if self.picture.color_by == ColorBy::Distance => Some(palette::INK),
+            Rank::Occupied if self.picture.color_by == ColorBy::Distance => Some(theme.ink),
             Rank::Occupied => Some(match &known.cells.layer {
                 Some(layer) => match layer.at(known.place(at)) {
                     Some(LayerValue::Colour(color)) => color,
@@ -362,10 +352,10 @@ impl<'a> Drawing<'a> {
                 None => value_color(),
             }),
             Rank::Free => match self.picture.color_by {
-                _ if self.collected.content != Content::Values => Some(palette::FREE),
-                ColorBy::Height | ColorBy::Probability | ColorBy::Layer(_) => Some(palette::FREE),
+                _ if self.collected.content != Content::Values => Some(theme.free),
+                ColorBy::Height | ColorBy::Probability | ColorBy::Layer(_) => Some(theme.free),
                 ColorBy::Distance => Some(value_color()),
-                ColorBy::Count | ColorBy::LastScan => Some(mixed(palette::UNKNOWN, value_color(), 0.4)),
+                ColorBy::Count | ColorBy::LastScan => Some(mixed(theme.ground, value_color(), 0.4)),
             },
         }
     }
@@ -383,7 +373,8 @@ impl<'a> Drawing<'a> {
         (1.0 + 0.1 * (left_m + above_m)).clamp(0.72, 1.22)
     }
 
-    fn draw_tile_lines(&self, canvas: &mut Canvas, known: &Known, pane: &Pane, every_m: f64) {
+    fn draw_tile_lines(&self, canvas: &mut Canvas, known: &Known, pane: &Pane, every_m: f64, width: usize) {
+        let color = self.theme().line;
         let (size, frame) = (pane.size(), &known.frame);
         let every = ((every_m / self.grid.resolution_m()).round() as i64).max(1);
         for (k, axis) in frame.view.axes().into_iter().enumerate() {
@@ -396,10 +387,16 @@ impl<'a> Drawing<'a> {
                     ((line - low) as f64 / frame.voxels_a_cell as f64 * pane.zoom as f64).round() as usize;
                 if k == 0 {
                     let left = pane.left + at.min(size[0] - 1);
-                    canvas.fill(left, pane.top, [1, size[1]], palette::TILE_LINE, 0.2);
+                    canvas.fill(
+                        left,
+                        pane.top,
+                        [width.min(size[0] - at.min(size[0] - 1)), size[1]],
+                        color,
+                        0.2,
+                    );
                 } else {
                     let row = size[1].saturating_sub(at.max(1));
-                    canvas.fill(pane.left, pane.top + row, [size[0], 1], palette::TILE_LINE, 0.2);
+                    canvas.fill(pane.left, pane.top + row, [size[0], width.min(size[1] - row)], color, 0.2);
                 }
             }
         }
@@ -413,45 +410,6 @@ impl<'a> Drawing<'a> {
             every_m *= 10.0;
         }
         every_m
-    }
-
-    /// Draws the trajectory as a line, with gaps at jumps such as the start of another recording.
-    fn draw_path(&self, canvas: &mut Canvas, known: &Known, pane: &Pane, dot: usize) {
-        let resolution_m = self.grid.resolution_m();
-        let positions: Vec<[f64; 2]> =
-            self.picture.path.iter().map(|&place| known.frame.position_of(place, resolution_m)).collect();
-        let length = |pair: &[[f64; 2]]| (pair[1][0] - pair[0][0]).hypot(pair[1][1] - pair[0][1]);
-        let mut steps: Vec<f64> = positions.windows(2).map(length).collect();
-        steps.sort_unstable_by(f64::total_cmp);
-        let usual = steps.get(steps.len() / 2).copied().unwrap_or_default();
-        let longest = 8.0 * usual.max(2.0 / pane.zoom as f64);
-        let mut middles: Vec<[usize; 2]> =
-            positions.first().and_then(|&at| pane.pixel_of(at)).into_iter().collect();
-        for pair in positions.windows(2) {
-            let length = length(pair);
-            // One step per pixel. The bound is longer than any line inside the picture.
-            let parts =
-                (length * pane.zoom as f64).ceil().clamp(1.0, 4.0 * super::options::MAX_PX as f64) as usize;
-            let parts = if length <= longest { parts } else { 1 };
-            for part in 1..=parts {
-                let share = part as f64 / parts as f64;
-                let at = std::array::from_fn(|k| pair[0][k] * (1.0 - share) + pair[1][k] * share);
-                if let Some(pixel) = pane.pixel_of(at)
-                    && middles.last() != Some(&pixel)
-                {
-                    middles.push(pixel);
-                }
-            }
-        }
-        // Draw each pixel once, even if the sensor was at rest there for hours.
-        middles.sort_unstable();
-        middles.dedup();
-        let pixels_a_metre = pane.zoom as f64 / (known.frame.voxels_a_cell as f64 * resolution_m);
-        // A radius of 0.2 m, limited to a few pixels: a wider line would hide the streets of a large map.
-        let most = if self.picture.has_legend { dot + 1 } else { 1 };
-        let radius = ((0.2 * pixels_a_metre) as usize).clamp(usize::from(self.picture.has_legend), most);
-        let color = if self.collected.content == Content::Values { palette::PATH } else { palette::INK };
-        canvas.path(middles.into_iter(), radius, color);
     }
 }
 
@@ -471,34 +429,4 @@ fn with_air(known: &Known) -> ([usize; 2], [usize; 2]) {
     let first: [usize; 2] = std::array::from_fn(|k| known.first[k].saturating_sub(air));
     let end = |k: usize| (known.first[k] + known.count[k] + air).min(known.frame.cells[k]);
     (first, std::array::from_fn(|k| end(k) - first[k]))
-}
-
-/// Layout of the image in pixels.
-struct Layout {
-    width: usize,
-    height: usize,
-    margin: usize,
-    left: usize,
-    top: usize,
-    /// First row of the legend.
-    foot: usize,
-    /// Edge of the squares that letters consist of, in pixels.
-    dot: usize,
-}
-
-impl Layout {
-    fn of(picture: &Picture, size: [usize; 2], entries: &[Entry]) -> Self {
-        if !picture.has_legend {
-            let [width, height] = size;
-            return Self { width, height, margin: 0, left: 0, top: 0, foot: height, dot: 1 };
-        }
-        let inner = size[0].max(MIN_WIDTH);
-        let dot = (inner / 480).clamp(2, 5);
-        let margin = 10 * dot;
-        let width = inner + 2 * margin;
-        let top = 2 * margin + font::HEIGHT * dot;
-        let foot = top + size[1] + margin;
-        let legend = legend_height(entries, width, dot) * dot;
-        Self { width, height: foot + legend + margin, margin, left: (width - size[0]) / 2, top, foot, dot }
-    }
 }

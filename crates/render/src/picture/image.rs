@@ -1,11 +1,15 @@
+use std::io::Write;
 use std::{fmt, io};
 
-/// Opaque image in sRGB.
-#[derive(Clone, PartialEq, Eq)]
+const METRES_PER_INCH: f64 = 0.0254;
+
+/// Image in sRGB, with alpha.
+#[derive(Clone, PartialEq)]
 pub struct Image {
     width_px: usize,
     height_px: usize,
     rgba: Vec<u8>,
+    dpi: f64,
 }
 
 impl fmt::Debug for Image {
@@ -16,9 +20,9 @@ impl fmt::Debug for Image {
 }
 
 impl Image {
-    pub(super) fn new(width_px: usize, height_px: usize, rgba: Vec<u8>) -> Self {
+    pub(super) fn new(width_px: usize, height_px: usize, rgba: Vec<u8>, dpi: f64) -> Self {
         debug_assert_eq!(rgba.len(), 4 * width_px * height_px);
-        Self { width_px, height_px, rgba }
+        Self { width_px, height_px, rgba, dpi }
     }
 
     /// Width in pixels.
@@ -31,7 +35,12 @@ impl Image {
         self.height_px
     }
 
-    /// Red, green, blue and alpha (always 255) of each pixel, row by row from the top.
+    /// Resolution in pixels per inch, for which type and lines are made.
+    pub fn dpi(&self) -> f64 {
+        self.dpi
+    }
+
+    /// Red, green, blue and alpha of each pixel, row by row from the top. Alpha is 255 but on a transparent background.
     pub fn rgba(&self) -> &[u8] {
         &self.rgba
     }
@@ -43,7 +52,7 @@ impl Image {
         is_inside.then(|| self.rgba.get(at..at + 3)?.try_into().ok())?
     }
 
-    /// Writes the image as PNG.
+    /// Writes the image as PNG, with its resolution. Memory: a row.
     ///
     /// # Errors
     ///
@@ -53,13 +62,25 @@ impl Image {
         let width = u32::try_from(self.width_px).map_err(too_large)?;
         let height = u32::try_from(self.height_px).map_err(too_large)?;
         let mut encoder = png::Encoder::new(out, width, height);
-        // Alpha is constant and would add a tenth to the file.
-        encoder.set_color(png::ColorType::Rgb);
+        // A constant alpha would add a tenth to the file.
+        let is_opaque = self.rgba.chunks_exact(4).all(|pixel| pixel[3] == 255);
+        encoder.set_color(if is_opaque { png::ColorType::Rgb } else { png::ColorType::Rgba });
         encoder.set_depth(png::BitDepth::Eight);
+        let per_metre = (self.dpi / METRES_PER_INCH).round().clamp(1.0, f64::from(u32::MAX)) as u32;
+        let unit = png::Unit::Meter;
+        encoder.set_pixel_dims(Some(png::PixelDimensions { xppu: per_metre, yppu: per_metre, unit }));
         let mut writer = encoder.write_header()?;
-        let rgb: Vec<u8> =
-            self.rgba.chunks_exact(4).flat_map(|pixel| [pixel[0], pixel[1], pixel[2]]).collect();
-        writer.write_image_data(&rgb)?;
+        let mut stream = writer.stream_writer()?;
+        for row in self.rgba.chunks_exact((4 * self.width_px).max(1)) {
+            if is_opaque {
+                let rgb: Vec<u8> =
+                    row.chunks_exact(4).flat_map(|pixel| [pixel[0], pixel[1], pixel[2]]).collect();
+                stream.write_all(&rgb)?;
+            } else {
+                stream.write_all(row)?;
+            }
+        }
+        stream.finish()?;
         Ok(writer.finish()?)
     }
 }

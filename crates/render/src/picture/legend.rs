@@ -1,20 +1,25 @@
 use super::canvas::Canvas;
-use super::font;
-use super::palette::{self, Rgb, color_of};
+use super::labels::{grouped, labels};
+use super::measure::Measure;
+use super::palette::{self, Rgb};
 use super::scale::{length_label, round_length_m};
-use super::time_labels::short_time_labels;
+use super::theme::Theme;
 use super::view::ColorBy;
-use crate::Layer;
+use crate::{ColorMap, Layer};
 
 /// Legend below the map.
 pub struct Legend {
     pub metres_a_pixel: f64,
     /// Distance between grid lines in metres, if there are any.
     pub lines_m: Option<f64>,
-    /// Axes to the right and up: 0 is x.
-    pub axes: [usize; 2],
+    /// Names and directions of the axes in the image, right and down, of length 1 or less.
+    pub axes: Vec<(&'static str, [f64; 2])>,
+    /// Whether the y axis is north.
+    pub has_north: bool,
     /// Whether the trajectory is drawn.
     pub has_path: bool,
+    /// Whether free and unknown space are drawn.
+    pub has_space: bool,
     pub scale: Scale,
     /// Further colors with their meaning, in rows below the other parts.
     pub entries: Vec<Entry>,
@@ -29,37 +34,50 @@ pub struct Entry {
 /// Meaning of the colors.
 pub enum Scale {
     /// Quantity, with the values of the first and the last color if there are any.
-    Values { color_by: ColorBy, range: Option<[f64; 2]> },
+    Values { color_by: ColorBy, color_map: &'static ColorMap, range: Option<[f64; 2]> },
     /// Change from one state to another.
     Change,
     /// Classes of a comparison, which are entries.
     Comparison,
 }
 
-/// Top of the first row of entries, below the other parts of the legend, in dots.
-const FIRST_ROW: usize = 29;
-/// Distance between rows of entries, in dots.
-const ROW: usize = font::HEIGHT + 5;
+/// Lengths in points. Space at both sides:
+const MARGIN: f64 = 10.0;
+/// Height of the legend without entries.
+const HEIGHT: f64 = 23.0;
+/// Top of the first row of labels.
+const FIRST_LABEL: f64 = 3.0;
+/// Bottom of bars and of the second row of labels.
+const BOTTOM: f64 = 21.0;
+/// Top of the first row of entries.
+const FIRST_ROW: f64 = 28.0;
+/// Distance between rows of entries.
+const ROW: f64 = 11.0;
+/// Edge of a swatch, and the distance from its left border to its label.
+const SWATCH: [f64; 2] = [6.0, 9.5];
+/// Width of the columns of swatches.
+const COLUMN: f64 = 56.0;
 
-/// Returns the height of the legend of an image in dots.
-pub fn legend_height(entries: &[Entry], width: usize, dot: usize) -> usize {
-    match places_of(entries, width, dot).last() {
-        Some([_, top]) => top + font::HEIGHT + 2,
-        None => 24,
+/// Returns the height of the legend of an image in pixels.
+pub fn legend_height(entries: &[Entry], width: usize, measure: Measure) -> usize {
+    match places_of(entries, width, measure).last() {
+        Some([_, top]) => top + measure.px(SWATCH[0] + 2.0),
+        None => measure.px(HEIGHT),
     }
 }
 
-/// Returns the upper left corners of the entries in dots, in rows that fit the width of the image.
-fn places_of(entries: &[Entry], width: usize, dot: usize) -> Vec<[usize; 2]> {
-    let most = (width / dot).saturating_sub(MARGIN);
-    let (mut left, mut top) = (MARGIN, FIRST_ROW);
+/// Returns the upper left corners of the entries in pixels from the first row of the legend, in rows that fit the width
+/// of the image.
+fn places_of(entries: &[Entry], width: usize, measure: Measure) -> Vec<[usize; 2]> {
+    let margin = measure.px(MARGIN);
+    let (mut left, mut top) = (margin, measure.px(FIRST_ROW));
     let place = |entry: &Entry| {
-        let width = SWATCH + font::width_of(&entry.label);
-        if left + width > most && left > MARGIN {
-            (left, top) = (MARGIN, top + ROW);
+        let wide = measure.px(SWATCH[1]) + measure.label().width_of(&entry.label);
+        if left + wide + margin > width && left > margin {
+            (left, top) = (margin, top + measure.px(ROW));
         }
         let place = [left, top];
-        left += width + 12;
+        left += wide + measure.px(10.0);
         place
     };
     entries.iter().map(place).collect()
@@ -70,83 +88,114 @@ pub fn moving_entry(points: u64) -> Entry {
     Entry { color: Some(palette::MOVING), label: format!("moving points: {}", grouped(points)) }
 }
 
-/// Space at both sides of the legend, in dots.
-const MARGIN: usize = 10;
-/// Distance from the left border of a swatch to its label, in dots.
-const SWATCH: usize = 11;
+/// Where and how a legend is drawn.
+pub struct Pen<'a> {
+    pub canvas: &'a mut Canvas,
+    /// First row of the legend.
+    pub foot: usize,
+    pub measure: Measure,
+    pub theme: &'a Theme,
+}
 
 impl Legend {
-    /// Draws the legend below the row `foot` with dots of `dot` pixels: axes, scale bar, free and unknown, colors.
-    pub fn draw(&self, canvas: &mut Canvas, foot: usize, dot: usize) {
-        let margin = MARGIN * dot;
-        let bottom = foot + 22 * dot;
-        let line = bottom - font::HEIGHT * dot;
-        // Axes.
-        let arm = 16 * dot;
-        canvas.fill(margin, bottom - arm, [dot, arm], palette::INK, 1.0);
-        canvas.fill(margin, bottom - dot, [arm, dot], palette::INK, 1.0);
-        for step in 0..3 {
-            let (back, wide) = (step * dot, [(1 + 2 * step) * dot, dot]);
-            canvas.fill(margin - back, bottom - arm - 2 * dot + back, wide, palette::INK, 1.0);
-            canvas.fill(
-                margin + arm + dot - back,
-                bottom - dot - back,
-                [wide[1], wide[0]],
-                palette::INK,
-                1.0,
-            );
-        }
-        canvas.text(margin + arm + 5 * dot, line, dot, palette::INK, name_of(self.axes[0]));
-        canvas.text(margin + 5 * dot, bottom - arm - 3 * dot, dot, palette::INK, name_of(self.axes[1]));
-        // Scale bar.
-        let length_m = round_length_m(canvas.width() as f64 * 0.2 * self.metres_a_pixel);
-        let length = ((length_m / self.metres_a_pixel).round() as usize).max(1);
-        let left = margin + arm + 20 * dot;
-        canvas.text(left, foot + 4 * dot, dot, palette::INK, &length_label(length_m));
-        canvas.fill(left, bottom - 2 * dot, [length, 2 * dot], palette::INK, 1.0);
-        canvas.fill(left, bottom - 6 * dot, [dot, 6 * dot], palette::INK, 1.0);
-        canvas.fill(left + length.saturating_sub(dot), bottom - 6 * dot, [dot, 6 * dot], palette::INK, 1.0);
-        if let Some(every_m) = self.lines_m {
-            let label = format!("lines {}", length_label(every_m));
-            canvas.text(left + length + 8 * dot, line, dot, palette::FAINT_INK, &label);
-        }
-        let right = canvas.width() - margin;
-        let bar = self.bar_width(canvas.width(), dot);
-        self.draw_scale(canvas, [right, bar], foot, dot);
-        // Colors of free and unknown space.
-        let swatch = right.saturating_sub(bar + 74 * dot);
+    /// Draws axes, scale bar, free and unknown space, colors.
+    pub fn draw(&self, pen: &mut Pen) {
+        self.draw_axes(pen);
+        self.draw_scale_bar(pen);
+        let (measure, label) = (pen.measure, pen.measure.label());
+        let right = pen.canvas.width() - measure.px(MARGIN);
+        let bar = self.bar_width(pen.canvas.width(), measure);
+        self.draw_colors(pen, [right, bar]);
+        let [top, line] = pen.rows();
+        let mut swatch = right.saturating_sub(bar + measure.px(COLUMN + 8.0));
         let is_of_distances = matches!(self.scale, Scale::Values { color_by: ColorBy::Distance, .. });
-        let first = if is_of_distances { (palette::INK, "obstacle") } else { (palette::FREE, "free") };
-        if !matches!(self.scale, Scale::Comparison) {
-            for (top, (color, label)) in [(foot + 4 * dot, first), (line, (palette::UNKNOWN, "unknown"))] {
-                draw_swatch(canvas, [swatch, top], dot, color, label);
-            }
+        let first = if is_of_distances { (pen.theme.ink, "obstacle") } else { (pen.theme.free, "free") };
+        if self.has_space {
+            pen.swatch([swatch, top], first.0, first.1);
+            pen.swatch([swatch, line], pen.theme.ground, "unknown");
+            swatch = swatch.saturating_sub(measure.px(COLUMN - 8.0));
         }
         if self.has_path {
-            let (sensor, top) = (swatch.saturating_sub(60 * dot), foot + 4 * dot);
-            let color = if matches!(self.scale, Scale::Change) { palette::INK } else { palette::PATH };
-            canvas.path(std::iter::once([sensor + 3 * dot, top + 3 * dot]), dot + 1, color);
-            canvas.text(sensor + 11 * dot, top, dot, palette::FAINT_INK, "sensor");
+            let color = if matches!(self.scale, Scale::Change) { pen.theme.ink } else { pen.theme.path };
+            let middle = top + label.height() / 2;
+            let dot = [swatch + measure.px(3.0), middle];
+            pen.canvas.path(std::iter::once(dot), measure.px(1.6), color, pen.theme.ground);
+            pen.canvas.text(swatch + measure.px(SWATCH[1]), top, label, pen.theme.faint_ink, "sensor");
         }
-        for (entry, [left, row]) in self.entries.iter().zip(places_of(&self.entries, canvas.width(), dot)) {
-            let place = [left * dot, foot + row * dot];
+        let places = places_of(&self.entries, pen.canvas.width(), measure);
+        for (entry, [left, row]) in self.entries.iter().zip(places) {
+            let place = [left, pen.foot + row];
             match entry.color {
-                Some(color) => draw_swatch(canvas, place, dot, color, &entry.label),
-                None => canvas.text(place[0], place[1], dot, palette::FAINT_INK, &entry.label),
+                Some(color) => pen.swatch(place, color, &entry.label),
+                None => pen.canvas.text(place[0], place[1], label, pen.theme.faint_ink, &entry.label),
             }
         }
     }
 
-    fn draw_scale(&self, canvas: &mut Canvas, [right, bar]: [usize; 2], foot: usize, dot: usize) {
-        let (top, bottom) = (foot + 4 * dot, foot + 22 * dot);
-        let Scale::Values { color_by, range } = &self.scale else {
+    /// Draws an arrow for each axis, with its name, and the direction of north.
+    fn draw_axes(&self, pen: &mut Pen) {
+        let (measure, label, ink) = (pen.measure, pen.measure.label(), pen.theme.ink);
+        let arm = measure.exact_px(16.0);
+        // Arrows that point to the left or down need space there.
+        let most = |k: usize, sign: f64| self.axes.iter().map(|(_, to)| sign * to[k]).fold(0.0, f64::max);
+        let start = [
+            measure.exact_px(MARGIN) + arm * most(0, -1.0),
+            pen.foot as f64 + measure.exact_px(BOTTOM) - arm * most(1, 1.0),
+        ];
+        for (name, to) in &self.axes {
+            let is_north = self.has_north && *name == "y";
+            pen.arrow(start, to.map(|k| k * arm), ink);
+            let name = if is_north { "y, north" } else { name };
+            let gap = arm + measure.exact_px(4.0);
+            let length = to[0].hypot(to[1]).max(1e-9);
+            let middle: [f64; 2] =
+                std::array::from_fn(|k| start[k] + to[k] * arm + to[k] / length * (gap - arm));
+            let wide = label.width_of(name) as f64;
+            let left = match to[0] / length {
+                right if right > 0.3 => middle[0],
+                right if right < -0.3 => middle[0] - wide,
+                // Next to the tip of a vertical arrow.
+                _ => start[0] + measure.exact_px(4.0),
+            };
+            let top = if to[0].abs() > 0.3 * length {
+                middle[1] - 0.5 * label.height() as f64
+            } else {
+                start[1] + to[1] * arm - measure.exact_px(1.0)
+            };
+            pen.canvas.text(left.max(0.0) as usize, top.max(0.0) as usize, label, ink, name);
+        }
+    }
+
+    fn draw_scale_bar(&self, pen: &mut Pen) {
+        let (measure, label, ink) = (pen.measure, pen.measure.label(), pen.theme.ink);
+        let length_m = round_length_m(pen.canvas.width() as f64 * 0.2 * self.metres_a_pixel);
+        let length = ((length_m / self.metres_a_pixel).round() as usize).max(1);
+        let north = if self.has_north { label.width_of(", north") } else { 0 };
+        let (left, bottom) = (measure.px(MARGIN + 36.0) + north, pen.foot + measure.px(BOTTOM));
+        let [top, line] = pen.rows();
+        let (thick, end) = (measure.px(1.4), measure.px(5.0));
+        pen.canvas.text(left, top, label, ink, &length_label(length_m));
+        pen.canvas.fill(left, bottom - thick, [length, thick], ink, 1.0);
+        for at in [left, left + length.saturating_sub(measure.px(0.9))] {
+            pen.canvas.fill(at, bottom - end, [measure.px(0.9), end], ink, 1.0);
+        }
+        if let Some(every_m) = self.lines_m {
+            let text = format!("grid {}", length_label(every_m));
+            pen.canvas.text(left + length + measure.px(7.0), line, label, pen.theme.faint_ink, &text);
+        }
+    }
+
+    fn draw_colors(&self, pen: &mut Pen, [right, bar]: [usize; 2]) {
+        let ([top, line], label) = (pen.rows(), pen.measure.label());
+        let (ink, faint) = (pen.theme.ink, pen.theme.faint_ink);
+        let Scale::Values { color_by, color_map, range } = &self.scale else {
             if matches!(self.scale, Scale::Comparison) {
                 return;
             }
-            let (left, line) = (right - bar, bottom - font::HEIGHT * dot);
-            draw_swatch(canvas, [left, top], dot, palette::APPEARED, "appeared");
-            draw_swatch(canvas, [left, line], dot, palette::VANISHED, "vanished");
-            draw_swatch(canvas, [left + 68 * dot, top], dot, palette::SAME, "same");
+            let left = right - bar;
+            pen.swatch([left, top], palette::APPEARED, "appeared");
+            pen.swatch([left, line], palette::VANISHED, "vanished");
+            pen.swatch([left + pen.measure.px(COLUMN), top], palette::SAME, "same");
             return;
         };
         let Some(range) = *range else {
@@ -155,29 +204,31 @@ impl Legend {
                 ColorBy::Layer(Layer::Class) => "class",
                 _ => return,
             };
-            canvas.text_before(right, top, dot, palette::FAINT_INK, name);
+            pen.canvas.text_before(right, top, label, faint, name);
             return;
         };
+        let high = pen.measure.px(6.0);
+        let bar_top = pen.foot + pen.measure.px(BOTTOM) - high;
         for x in 0..bar {
-            let color = color_of(x as f64 / (bar - 1).max(1) as f64);
-            canvas.fill(right - bar + x, bottom - 7 * dot, [1, 7 * dot], color, 1.0);
+            let color = color_map.color_of(x as f64 / (bar - 1).max(1) as f64);
+            pen.canvas.fill(right - bar + x, bar_top, [1, high], color, 1.0);
         }
         let (name, [low, high]) = labels(*color_by, range);
-        canvas.text(right - bar, top, dot, palette::INK, &low);
-        canvas.text_before(right, top, dot, palette::INK, &high);
-        if bar >= needed_width(name, [&low, &high], dot) {
-            let space = [font::width_of(&low), font::width_of(&high)];
-            let middle = right - bar / 2 + (space[0] + font::width_of(name)) * dot / 2 - space[1] * dot / 2;
-            canvas.text_before(middle, top, dot, palette::FAINT_INK, name);
+        pen.canvas.text(right - bar, top, label, ink, &low);
+        pen.canvas.text_before(right, top, label, ink, &high);
+        if bar >= needed_width(name, [&low, &high], pen.measure) {
+            let [low, name_width, high] = [&low, name, &high].map(|text| label.width_of(text));
+            let end = right - bar / 2 + (low + name_width) / 2 - high / 2;
+            pen.canvas.text_before(end, top, label, faint, name);
         }
     }
 
     /// Returns the width of the color bar: a quarter of the picture, or up to half of it if its labels need more.
-    fn bar_width(&self, width: usize, dot: usize) -> usize {
+    fn bar_width(&self, width: usize, measure: Measure) -> usize {
         let needed = match &self.scale {
-            Scale::Values { color_by, range: Some(range) } => {
+            Scale::Values { color_by, range: Some(range), .. } => {
                 let (name, [low, high]) = labels(*color_by, *range);
-                needed_width(name, [&low, &high], dot)
+                needed_width(name, [&low, &high], measure)
             }
             _ => 0,
         };
@@ -185,61 +236,42 @@ impl Legend {
     }
 }
 
-/// Returns the labels above the color bar: its quantity, and the first and the last value.
-fn labels(color_by: ColorBy, [least, most]: [f64; 2]) -> (&'static str, [String; 2]) {
-    match color_by {
-        ColorBy::Height => ("height", [least, most].map(height_label)),
-        ColorBy::Probability => ("probability", [least, most].map(|value| format!("{value:.2}"))),
-        ColorBy::Count => ("count", [least, most].map(|value| format!("{value:.0}"))),
-        ColorBy::LastScan => ("last scan", [least, most].map(|value| format!("{value:.0}"))),
-        ColorBy::Distance => ("distance", [least, most].map(|value| format!("{value} m"))),
-        ColorBy::Layer(Layer::Time) => match short_time_labels([least, most]) {
-            (labels, None) => ("last hit", labels),
-            // The rest of the dates is an entry with this name.
-            (labels, Some(_)) => ("", labels),
-        },
-        ColorBy::Layer(layer) => (layer.name(), [least, most].map(|value| number_label(value, most - least))),
+impl Pen<'_> {
+    /// Returns the tops of both rows of labels.
+    fn rows(&self) -> [usize; 2] {
+        let bottom = self.foot + self.measure.px(BOTTOM);
+        [self.foot + self.measure.px(FIRST_LABEL), bottom - self.measure.label().height()]
+    }
+
+    fn swatch(&mut self, [left, top]: [usize; 2], color: Rgb, label: &str) {
+        let (edge, border) = (self.measure.px(SWATCH[0]), self.measure.px(0.4));
+        self.canvas.fill(left, top, [edge; 2], self.theme.faint_ink, 1.0);
+        let inner = [edge.saturating_sub(2 * border); 2];
+        self.canvas.fill(left + border, top + border, inner, color, 1.0);
+        let text = left + self.measure.px(SWATCH[1]);
+        self.canvas.text(text, top, self.measure.label(), self.theme.faint_ink, label);
+    }
+
+    fn arrow(&mut self, start: [f64; 2], along: [f64; 2], color: Rgb) {
+        let tip: [f64; 2] = std::array::from_fn(|k| start[k] + along[k]);
+        let length = along[0].hypot(along[1]);
+        // A direction towards the viewer is a dot.
+        if length < self.measure.exact_px(2.0) {
+            return;
+        }
+        let (width, head) = (self.measure.exact_px(0.9), self.measure.exact_px(3.2) / length);
+        self.canvas.line([start, tip], width, color, 1.0);
+        for side in [-0.6, 0.6] {
+            let back = [-along[0] - side * along[1], -along[1] + side * along[0]];
+            self.canvas.line([tip, [tip[0] + head * back[0], tip[1] + head * back[1]]], width, color, 1.0);
+        }
     }
 }
 
 /// Returns the width of a name between two values in pixels, with gaps.
-fn needed_width(name: &str, ends: [&str; 2], dot: usize) -> usize {
-    let letters = font::width_of(name) + ends.map(font::width_of).iter().sum::<usize>();
-    (letters + 2 * 6) * dot
-}
-
-fn draw_swatch(canvas: &mut Canvas, [left, top]: [usize; 2], dot: usize, color: palette::Rgb, label: &str) {
-    canvas.fill(left, top, [7 * dot; 2], palette::FAINT_INK, 1.0);
-    canvas.fill(left + 1, top + 1, [7 * dot - 2; 2], color, 1.0);
-    canvas.text(left + SWATCH * dot, top, dot, palette::FAINT_INK, label);
-}
-
-fn name_of(axis: usize) -> &'static str {
-    ["x", "y", "z"].get(axis).copied().unwrap_or_default()
-}
-
-/// Formats a number with a comma before every third digit.
-fn grouped(number: u64) -> String {
-    let digits = number.to_string();
-    let mut text = String::new();
-    for (at, digit) in digits.chars().enumerate() {
-        if at > 0 && (digits.len() - at).is_multiple_of(3) {
-            text.push(',');
-        }
-        text.push(digit);
-    }
-    text
-}
-
-/// Formats a value with two or three digits of its range.
-fn number_label(value: f64, range: f64) -> String {
-    let digits = (2.0 - range.max(1e-9).log10().floor()).clamp(0.0, 9.0) as usize;
-    format!("{value:.digits$}")
-}
-
-fn height_label(height_m: f64) -> String {
-    // Adding 0 converts -0, for example of a height just below the ground, to 0.
-    format!("{:.1} m", (height_m * 10.0).round() / 10.0 + 0.0)
+fn needed_width(name: &str, ends: [&str; 2], measure: Measure) -> usize {
+    let label = measure.label();
+    label.width_of(name) + ends.map(|end| label.width_of(end)).iter().sum::<usize>() + measure.px(10.0)
 }
 
 #[cfg(test)]
@@ -247,44 +279,39 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_height_just_below_zero_is_written_as_zero() {
-        assert_eq!(height_label(-0.04), "0.0 m");
-        assert_eq!(height_label(-1.26), "-1.3 m");
-    }
-
-    #[test]
-    fn digits_are_grouped() {
-        assert_eq!([0, 999, 1000, 1_234_567].map(grouped), ["0", "999", "1,000", "1,234,567"]);
-    }
-
-    #[test]
-    fn numbers_have_the_digits_of_their_range() {
-        assert_eq!([number_label(17.26, 200.0), number_label(1.234, 0.5)], ["17", "1.234"]);
-        assert_eq!(number_label(0.0, 0.0), "0.000000000");
-    }
-
-    #[test]
     fn entries_fill_rows() {
         let entry = |label: &str| Entry { color: Some([0; 3]), label: label.to_owned() };
         let entries = ["2 ground", "6 building", "5 high vegetation", "9 water"].map(entry);
-        let places = places_of(&entries, 400, 2);
-        assert_eq!((places[0], places[2][1]), ([MARGIN, FIRST_ROW], FIRST_ROW + ROW));
+        let measure = Measure::of([760, 760], Some(144.0));
+        let places = places_of(&entries, 400, measure);
+        assert_eq!(places[0], [20, 56]);
+        assert!(places.windows(2).any(|pair| pair[1] == [20, pair[0][1] + 22]), "{places:?}");
         for (entry, [left, _]) in entries.iter().zip(&places) {
-            assert!(left + SWATCH + font::width_of(&entry.label) <= 190);
+            assert!(left + 19 + measure.label().width_of(&entry.label) <= 380);
         }
-        assert_eq!(legend_height(&entries, 400, 2), places[3][1] + 9);
-        assert_eq!(places_of(&entries, 10, 2).len(), 4);
+        assert_eq!(legend_height(&entries, 400, measure), places[3][1] + 16);
+        assert_eq!(places_of(&entries, 10, measure).len(), 4);
     }
 
     #[test]
     fn a_name_and_its_values_do_not_overlap() {
-        for (width, dot, is_named) in [(2000, 2, true), (600, 2, true), (600, 3, false), (240, 2, false)] {
-            let scale = Scale::Values { color_by: ColorBy::Height, range: Some([-12.5, 108.6]) };
-            let (lines_m, has_path, entries) = (None, false, Vec::new());
-            let legend = Legend { metres_a_pixel: 0.1, lines_m, axes: [0, 2], has_path, scale, entries };
-            let bar = legend.bar_width(width, dot);
+        for (width, dpi, is_named) in [(2000, 144.0, true), (600, 144.0, true), (600, 250.0, false)] {
+            let (measure, color_map) = (Measure::of([width; 2], Some(dpi)), ColorMap::voxtile());
+            let scale = Scale::Values { color_by: ColorBy::Height, color_map, range: Some([-12.5, 108.6]) };
+            let legend = Legend {
+                metres_a_pixel: 0.1,
+                lines_m: None,
+                axes: Vec::new(),
+                has_north: false,
+                has_path: false,
+                has_space: true,
+                scale,
+                entries: Vec::new(),
+            };
+            let bar = legend.bar_width(width, measure);
             assert!(bar <= width / 2);
-            assert_eq!(bar >= needed_width("height", ["-12.5 m", "108.6 m"], dot), is_named, "{width}");
+            let needed = needed_width("height", ["-12.5 m", "108.6 m"], measure);
+            assert_eq!(bar >= needed, is_named, "{width}");
         }
     }
 }

@@ -4,8 +4,9 @@
 //! Picture   options                                            options, view
 //! Frame     voxels of each cell                                frame
 //! Cells     the best observation of each cell                  cells, layer_cells, collect
-//! Drawing   cells, grid, moving points, trajectory, legend     drawing, moving, legend, scale, time_labels
-//! Canvas    pixels, boxes, letters                             canvas, font, palette, image
+//! Drawing   cells, grid, moving points, trajectory             drawing, layout, pane, moving, trajectory
+//! Legend    axes, scale bar, colors                            legend, labels, scale, time_labels
+//! Canvas    pixels, boxes, lines, text                         canvas, typeface, measure, theme, palette, image
 //! compared  classes of the voxels of two maps, and boxes around changes
 //! OverTime  panels of a local map at several times             over_time
 //! ```
@@ -15,23 +16,30 @@ mod cells;
 mod collect;
 mod compared;
 mod drawing;
-mod font;
 mod frame;
 mod image;
+mod labels;
 mod layer_cells;
+mod layout;
 mod legend;
+mod measure;
 mod moving;
 mod options;
 mod over_time;
 mod palette;
+mod pane;
 mod scale;
+mod theme;
 mod time_labels;
+mod trajectory;
+mod typeface;
 mod view;
 
 pub use drawing::{Drawing, Drawn};
 pub use image::Image;
 pub use options::Picture;
 pub use over_time::{OverTime, Panel};
+pub use theme::Background;
 pub use time_labels::{is_unix_time, time_labels};
 pub use view::{Change, ColorBy, SideAxis, View};
 

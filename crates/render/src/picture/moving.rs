@@ -1,7 +1,7 @@
 use super::canvas::Canvas;
-use super::drawing::Pane;
 use super::frame::Frame;
-use super::palette;
+use super::palette::{self, Rgb};
+use super::pane::Pane;
 use voxtile::space::{Grid, Point};
 
 /// Cells that contain points on moving objects.
@@ -31,8 +31,8 @@ impl Moving {
         }
     }
 
-    /// Fills the cells, with a light rim that is visible on any color.
-    pub fn draw(&self, canvas: &mut Canvas, frame: &Frame, pane: &Pane) {
+    /// Fills the cells, with a rim that is visible on any color.
+    pub fn draw(&self, canvas: &mut Canvas, frame: &Frame, pane: &Pane, rim_color: Rgb) {
         let cells = self.is_hit.iter().enumerate().filter(|(_, is_hit)| **is_hit);
         let pixels: Vec<[usize; 2]> =
             cells.map(|(place, _)| pane.pixel([place % frame.cells[0], place / frame.cells[0]])).collect();
@@ -40,7 +40,7 @@ impl Moving {
         let rim = 1 + pane.zoom / 8;
         for &[left, top] in &pixels {
             let size = [pane.zoom + 2 * rim; 2];
-            canvas.fill(left.saturating_sub(rim), top.saturating_sub(rim), size, palette::INK, 1.0);
+            canvas.fill(left.saturating_sub(rim), top.saturating_sub(rim), size, rim_color, 1.0);
         }
         pixels.iter().for_each(|&[left, top]| canvas.fill(left, top, [pane.zoom; 2], palette::MOVING, 1.0));
     }

@@ -1,6 +1,8 @@
 use super::collect::{Collected, Source};
 use super::drawing::{Drawing, Drawn};
+use super::theme::Background;
 use super::view::{ColorBy, View};
+use crate::ColorMap;
 use voxtile::mapper::MapView;
 use voxtile::space::{Aabb, Point};
 use voxtile::{Error, Result};
@@ -14,27 +16,33 @@ use voxtile_distance::DistanceOptions;
 pub struct Picture {
     pub(super) view: View,
     pub(super) color_by: ColorBy,
+    pub(super) color_map: &'static ColorMap,
     pub(super) region: Option<Aabb>,
     pub(super) most_px: [usize; 2],
     pub(super) has_grid: bool,
     pub(super) has_legend: bool,
+    pub(super) dpi: Option<f64>,
+    pub(super) background: Background,
     pub(super) path: Vec<Point>,
     pub(super) title: String,
     pub(super) skips_unreadable: bool,
 }
 
-/// Maximum number of pixels along an edge. A picture of this size needs 1.2 GB.
-pub(super) const MAX_PX: usize = 8192;
+/// Maximum number of pixels along an edge. A square of this size needs 4.3 GB.
+pub(super) const MAX_PX: usize = 16384;
 
 impl Default for Picture {
     fn default() -> Self {
         Self {
             view: View::Above,
             color_by: ColorBy::Height,
+            color_map: ColorMap::voxtile(),
             region: None,
             most_px: [2048; 2],
             has_grid: true,
             has_legend: true,
+            dpi: None,
+            background: Background::Dark,
             path: Vec::new(),
             title: String::new(),
             skips_unreadable: false,
@@ -58,15 +66,32 @@ impl Picture {
         Self { color_by, ..self }
     }
 
+    /// Sets the colors of values. Colors and classes of points, and differences, have their own.
+    pub fn with_color_map(self, color_map: &'static ColorMap) -> Self {
+        Self { color_map, ..self }
+    }
+
     /// Draws only voxels whose center is in a box.
     pub fn with_region(self, region: Aabb) -> Self {
         Self { region: Some(region), ..self }
     }
 
-    /// Sets the maximum size of the map in pixels to the right and up, at most 8192; title and legend are added. A
+    /// Sets the maximum size of the map in pixels to the right and up, at most 16384; title and legend are added. A
     /// small map is enlarged to whole pixels per voxel; in a large map a pixel covers several voxels.
     pub fn with_size_px(self, most_px: [usize; 2]) -> Self {
         Self { most_px: most_px.map(|px| px.clamp(1, MAX_PX)), ..self }
+    }
+
+    /// Sets the resolution in pixels per inch, 10 to 10,000: the PNG has its physical size, and type and lines have
+    /// those of print. `None`, the default, makes the picture 17 cm wide, the text of an A4 page.
+    pub fn with_dpi(self, dpi: Option<f64>) -> Self {
+        let dpi = dpi.filter(|dpi| dpi.is_finite()).map(|dpi| dpi.clamp(10.0, 10_000.0));
+        Self { dpi, ..self }
+    }
+
+    /// Sets the background.
+    pub fn with_background(self, background: Background) -> Self {
+        Self { background, ..self }
     }
 
     /// Sets whether tile borders are drawn; only every tenth or hundredth if they would be too dense.
@@ -85,7 +110,7 @@ impl Picture {
         Self { path, ..self }
     }
 
-    /// Sets the title above the map. Characters that the font lacks are blank.
+    /// Sets the title above the map. Characters that the font lacks are boxes.
     pub fn with_title(self, title: impl Into<String>) -> Self {
         Self { title: title.into(), ..self }
     }

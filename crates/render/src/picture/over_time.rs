@@ -1,8 +1,9 @@
 use super::canvas::Canvas;
-use super::font;
 use super::image::Image;
+use super::measure::Measure;
 use super::palette::{self, color_of, lit};
 use super::scale::{PlaneFrame, length_label, round_length_m};
+use super::theme::{Background, Theme};
 use std::collections::HashMap;
 use voxtile::Result;
 use voxtile::space::{Aabb, Point};
@@ -34,7 +35,8 @@ pub struct Panel {
 const ACROSS: usize = 3;
 /// Maximum number of cells along the edge of a panel.
 const MAX_CELLS: usize = 640;
-const DOT: usize = 2;
+/// Resolution of the type in pixels per inch.
+const DPI: f64 = 150.0;
 const MARGIN: usize = 16;
 
 impl Panel {
@@ -54,29 +56,30 @@ impl Panel {
 impl OverTime {
     /// Draws all panels.
     pub fn draw(&self) -> Image {
-        self.canvas().into_image()
+        self.canvas().into_image(DPI)
     }
 
     fn canvas(&self) -> Canvas {
+        let (theme, measure) = (Theme::of(Background::Dark), measure());
         let frame = self.frame();
-        let Ok(frame) = frame else { return Canvas::new(8, 8, palette::UNKNOWN) };
+        let Ok(frame) = frame else { return Canvas::new(8, 8, &theme) };
         let zoom = (MAX_CELLS / frame.cells[0].max(frame.cells[1])).clamp(1, 8);
         // Minimum width of the label.
         let size = [(frame.cells[0] * zoom).max(260), frame.cells[1] * zoom];
         let across = self.panels.len().clamp(1, ACROSS);
         let down = self.panels.len().div_ceil(across);
-        let line = font::HEIGHT * DOT + MARGIN / 2;
+        let line = measure.title().height() + MARGIN / 2;
         let pitch = [size[0] + MARGIN, size[1] + line + MARGIN];
         let foot = MARGIN + line + down * pitch[1];
         let width = (across * pitch[0] + MARGIN).max(640);
-        let mut canvas = Canvas::new(width, foot + 2 * line + MARGIN, palette::UNKNOWN);
-        canvas.text(MARGIN, MARGIN, DOT, palette::INK, &self.title);
+        let mut canvas = Canvas::new(width, foot + 2 * line + MARGIN, &theme);
+        canvas.text(MARGIN, MARGIN, measure.title(), palette::INK, &self.title);
         let heights = self.heights();
         for (number, panel) in self.panels.iter().enumerate() {
             let left = MARGIN + number % across * pitch[0];
             let top = MARGIN + line + number / across * pitch[1];
             let label = format!("scan {}: {} occupied", panel.scan, panel.occupied);
-            canvas.text(left, top, DOT, palette::FAINT_INK, &label);
+            canvas.text(left, top, measure.label(), palette::FAINT_INK, &label);
             self.draw_panel(&mut canvas, panel, &frame, zoom, [left, top + line], heights);
         }
         draw_foot(&mut canvas, foot, frame.cell_m / zoom as f64, heights.map(|z| self.height_m(z)));
@@ -110,7 +113,7 @@ impl OverTime {
             }
         }
         let path = panel.path.iter().filter_map(|at| pixel(at[0], at[1]));
-        canvas.path(path.map(|corner| corner.map(|k| k + zoom / 2)), 1, palette::PATH);
+        canvas.path(path.map(|corner| corner.map(|k| k + zoom / 2)), 1, palette::PATH, palette::UNKNOWN);
     }
 
     fn height_m(&self, z: i32) -> f64 {
@@ -150,23 +153,28 @@ impl OverTime {
 
 /// Draws the scale bar, the colors, and the swatches of cells that are not occupied.
 fn draw_foot(canvas: &mut Canvas, foot: usize, metres_a_pixel: f64, [low_m, high_m]: [f64; 2]) {
+    let (label, edge) = (measure().label(), measure().label().height());
     let length_m = round_length_m(120.0 * metres_a_pixel);
     let length = ((length_m / metres_a_pixel).round() as usize).max(1);
-    let bar = foot + font::HEIGHT * DOT + MARGIN / 2;
-    canvas.text(MARGIN, foot, DOT, palette::INK, &length_label(length_m));
-    canvas.fill(MARGIN, bar, [length, 2 * DOT], palette::INK, 1.0);
+    let bar = foot + edge + MARGIN / 2;
+    canvas.text(MARGIN, foot, label, palette::INK, &length_label(length_m));
+    canvas.fill(MARGIN, bar, [length, 4], palette::INK, 1.0);
     let left = MARGIN + 160;
-    canvas.fill(left, foot, [7 * DOT; 2], palette::INFLATED, 1.0);
-    canvas.text(left + 10 * DOT, foot, DOT, palette::FAINT_INK, "inflated");
-    canvas.fill(left + 130, foot + 2 * DOT, [3 * DOT; 2], palette::PATH, 1.0);
-    canvas.text(left + 130 + 6 * DOT, foot, DOT, palette::FAINT_INK, "sensor");
+    canvas.fill(left, foot, [edge; 2], palette::INFLATED, 1.0);
+    canvas.text(left + edge + 8, foot, label, palette::FAINT_INK, "inflated");
+    canvas.fill(left + 130, foot + edge / 3, [edge / 2; 2], palette::PATH, 1.0);
+    canvas.text(left + 130 + edge, foot, label, palette::FAINT_INK, "sensor");
     let (width, right) = (160, canvas.width() - MARGIN);
     for x in 0..width {
         let color = color_of(x as f64 / width as f64);
-        canvas.fill(right - width + x, bar, [1, 5 * DOT], color, 1.0);
+        canvas.fill(right - width + x, bar, [1, 10], color, 1.0);
     }
-    canvas.text(right - width, foot, DOT, palette::INK, &format!("{low_m:.1} m"));
-    canvas.text_before(right, foot, DOT, palette::INK, &format!("{high_m:.1} m"));
+    canvas.text(right - width, foot, label, palette::INK, &format!("{low_m:.1} m"));
+    canvas.text_before(right, foot, label, palette::INK, &format!("{high_m:.1} m"));
+}
+
+fn measure() -> Measure {
+    Measure::of([0; 2], Some(DPI))
 }
 
 #[cfg(test)]
