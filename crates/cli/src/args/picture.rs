@@ -15,6 +15,12 @@ pub struct PictureArgs {
     /// Viewing direction
     #[arg(long, value_name = "VIEW", default_value = "above")]
     pub from: ViewName,
+    /// Oblique view: direction from the map to the viewer, counterclockwise from x, in degrees
+    #[arg(long, value_name = "DEGREES", default_value_t = -60.0)]
+    pub azimuth: f64,
+    /// Oblique view: angle of the viewer above the horizon, 0 to 90 degrees
+    #[arg(long, value_name = "DEGREES", default_value_t = 40.0)]
+    pub elevation: f64,
     /// Draw only the layer at this height from above, in metres
     #[arg(long, value_name = "Z")]
     pub slice: Option<f64>,
@@ -72,6 +78,8 @@ pub enum ViewName {
     SideX,
     /// From a side: y to the right, z up
     SideY,
+    /// From --azimuth and --elevation: occupied voxels as shaded cubes
+    Oblique,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]

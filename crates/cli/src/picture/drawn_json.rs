@@ -12,6 +12,9 @@ use voxtile_render::Drawn;
 pub struct DrawnJson {
     file: String,
     from: String,
+    /// Direction to the viewer; of the oblique view.
+    azimuth_deg: Option<f64>,
+    elevation_deg: Option<f64>,
     slice_m: Option<f64>,
     /// `None` for a picture of changes.
     color: Option<String>,
@@ -43,9 +46,12 @@ pub struct DrawnJson {
 
 impl DrawnJson {
     pub fn of(args: &PictureArgs, file: &Path, drawn: &Drawn, marked_points: Option<u64>) -> Self {
+        let is_oblique = args.from == ViewName::Oblique;
         Self {
             file: file.display().to_string(),
             from: view_name(args.from),
+            azimuth_deg: is_oblique.then_some(args.azimuth),
+            elevation_deg: is_oblique.then_some(args.elevation),
             slice_m: args.slice.or(args.distance_slice),
             color: match args.distance_slice {
                 Some(_) => Some("distance".to_owned()),

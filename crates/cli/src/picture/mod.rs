@@ -42,6 +42,9 @@ pub fn run(args: &PictureArgs, is_quiet: bool) -> anyhow::Result<ExitCode> {
             let progress = Progress::over_tiles(0);
             let mut picture = complete(&picture, args, map);
             let on_progress = |done, all| progress.set(done, all);
+            if args.from == ViewName::Oblique {
+                return Ok((picture.draw(map, on_progress)?, None));
+            }
             let drawing = match args.distance_slice {
                 None => picture.start(map, on_progress)?,
                 Some(_) => {
@@ -143,6 +146,10 @@ impl From<BackgroundName> for Background {
 }
 
 fn picture_of(args: &PictureArgs) -> Result<Picture> {
+    if args.from == ViewName::Oblique && (args.moving || args.since.is_some()) {
+        let reason = "the oblique view shows a single map, without --moving and --since";
+        return Err(Error::argument("--from", reason));
+    }
     let view = match (args.slice.or(args.distance_slice), args.from) {
         (Some(z_m), ViewName::Above) => View::Slice { z_m, thickness_m: args.thickness.unwrap_or(0.0) },
         (Some(_), _) => {
@@ -154,6 +161,9 @@ fn picture_of(args: &PictureArgs) -> Result<Picture> {
         (None, ViewName::Above) => View::Above,
         (None, ViewName::SideX) => View::Side(SideAxis::X),
         (None, ViewName::SideY) => View::Side(SideAxis::Y),
+        (None, ViewName::Oblique) => {
+            View::Oblique { azimuth_deg: args.azimuth, elevation_deg: args.elevation }
+        }
     };
     let size_px = [usize::from(args.size); 2];
     let mut picture = Picture::new().with_view(view).with_color(args.color.into()).with_size_px(size_px);
@@ -216,7 +226,7 @@ fn state_before(map: &Path, since: &Path) -> PathBuf {
 fn caption(args: &PictureArgs, drawn: &Drawn, marked: Option<u64>) -> String {
     let Some(region) = drawn.region_m else { return "no observed voxels here".to_owned() };
     let axes = match args.from {
-        ViewName::Above => [0, 1],
+        ViewName::Above | ViewName::Oblique => [0, 1],
         ViewName::SideX => [0, 2],
         ViewName::SideY => [1, 2],
     };

@@ -46,6 +46,7 @@ fn a_picture_matches_its_json() {
         &["--slice", "0.55", "--color", "probability"],
         &["--color", "last-scan", "--region", "-1", "-1", "-1", "9", "9", "9"],
         &["--slice", "0.5", "--thickness", "1", "--size", "300"],
+        &["--from", "oblique", "--azimuth", "-120", "--elevation", "25", "--color", "count"],
     ] {
         let printed = json(&[&["picture", text(&map), "-o", text(&file), "--json"], more].concat());
         assert!(printed["known_cells"].as_u64() > Some(0), "{more:?}: {printed}");
@@ -182,6 +183,10 @@ fn impossible_pictures_are_refused() {
         &["--region", "1", "1", "1", "0", "2", "2"],
         &["--size", "17000"],
         &["--dpi", "1"],
+        &["--from", "oblique", "--elevation", "91"],
+        &["--from", "oblique", "--since", text(&map)],
+        &["--from", "oblique", "--slice", "1"],
+        &["--from", "oblique", "--moving"],
         &["--color-map", "turbo"],
         &["--color-map", "gray", "--since", text(&map)],
         &["--color-map", "gray", "--color", "rgb"],

@@ -117,12 +117,12 @@ impl Cells {
 const SIGN: u32 = 1 << 31;
 
 /// Maps a float to an integer of the same order.
-fn ordered(value: f32) -> u32 {
+pub(super) fn ordered(value: f32) -> u32 {
     let bits = value.to_bits();
     if bits & SIGN == 0 { bits | SIGN } else { !bits }
 }
 
-fn unordered(bits: u32) -> f32 {
+pub(super) fn unordered(bits: u32) -> f32 {
     f32::from_bits(if bits & SIGN == 0 { !bits } else { bits & !SIGN })
 }
 

@@ -56,10 +56,9 @@ const MAX_TILES_READ_TWICE: usize = 4096;
 impl Collected {
     /// Reads all tiles. If the observed area is so small that cells can be finer, reads the tiles a second time.
     pub fn of(picture: &Picture, source: Source, progress: &(dyn Fn(u64, u64) + Sync)) -> Result<Self> {
-        let mut collector = Collector { picture, source, grid: source.grid(), unread: Mutex::default() };
+        let collector = Collector::new(picture, source);
         let tiles = collector.tiles();
-        let done =
-            Progress { done: AtomicU64::new(0), all: AtomicU64::new(tiles.len() as u64), report: progress };
+        let done = Progress::new(tiles.len() as u64, progress);
         let mut known = None;
         if let Some(voxels) = collector.bounds(&tiles) {
             known = collector.collect(&tiles, voxels, &done)?;
@@ -73,15 +72,12 @@ impl Collected {
                 known = collector.collect(&tiles, seen, &done)?;
             }
         }
-        let unread = collector.unread.get_mut().unwrap_or_else(PoisonError::into_inner);
-        unread.sort_unstable();
-        unread.dedup();
         Ok(Self {
             known,
             content: if matches!(source, Source::Two { .. }) { Content::Difference } else { Content::Values },
             max_distance_m: 0.0,
             tiles: tiles.len() as u64,
-            unread: std::mem::take(unread),
+            unread: collector.into_unread(),
         })
     }
 }
@@ -95,7 +91,7 @@ impl Collected {
         progress: &(dyn Fn(u64, u64) + Sync),
     ) -> Result<Self> {
         let grid = map.config().grid;
-        let collector = Collector { picture, source: Source::One(map), grid, unread: Mutex::default() };
+        let collector = Collector::new(picture, Source::One(map));
         let tiles = collector.tiles();
         let mut known = None;
         if let Some(voxels) = collector.bounds(&tiles) {
@@ -140,13 +136,17 @@ fn add_distances(field: &DistanceField, frame: &Frame, cells: &Cells) {
     }
 }
 
-struct Progress<'a> {
+pub(super) struct Progress<'a> {
     done: AtomicU64,
     all: AtomicU64,
     report: &'a (dyn Fn(u64, u64) + Sync),
 }
 
-impl Progress<'_> {
+impl<'a> Progress<'a> {
+    pub fn new(all: u64, report: &'a (dyn Fn(u64, u64) + Sync)) -> Self {
+        Self { done: AtomicU64::new(0), all: AtomicU64::new(all), report }
+    }
+
     fn step(&self) {
         let done = 1 + self.done.fetch_add(1, Ordering::Relaxed);
         (self.report)(done, self.all.load(Ordering::Relaxed));
@@ -162,14 +162,27 @@ impl Source<'_> {
     }
 }
 
-struct Collector<'a> {
+/// Reader of the tiles of a picture.
+pub(super) struct Collector<'a> {
     picture: &'a Picture,
     source: Source<'a>,
     grid: Grid,
     unread: Mutex<Vec<TileIndex>>,
 }
 
-impl Collector<'_> {
+impl<'a> Collector<'a> {
+    pub fn new(picture: &'a Picture, source: Source<'a>) -> Self {
+        Self { picture, source, grid: source.grid(), unread: Mutex::default() }
+    }
+
+    /// Returns the unreadable tiles that were skipped, in order.
+    pub fn into_unread(self) -> Vec<TileIndex> {
+        let mut unread = self.unread.into_inner().unwrap_or_else(PoisonError::into_inner);
+        unread.sort_unstable();
+        unread.dedup();
+        unread
+    }
+
     /// Returns the selected voxels.
     fn wanted(&self) -> VoxelBox {
         let all = VoxelBox { min: [i32::MIN; 3], end: [i32::MAX; 3] };
@@ -191,7 +204,7 @@ impl Collector<'_> {
     }
 
     /// Returns the tiles that contain some of these voxels, in order.
-    fn tiles(&self) -> Vec<TileIndex> {
+    pub fn tiles(&self) -> Vec<TileIndex> {
         let mut tiles = match self.source {
             Source::One(map) => map.tile_indices(),
             Source::Two { before, after } => [before.tile_indices(), after.tile_indices()].concat(),
@@ -203,7 +216,8 @@ impl Collector<'_> {
         tiles
     }
 
-    fn bounds(&self, tiles: &[TileIndex]) -> Option<VoxelBox> {
+    /// Returns the bounds of the selected voxels of the tiles; `None` without tiles.
+    pub fn bounds(&self, tiles: &[TileIndex]) -> Option<VoxelBox> {
         let wanted = self.wanted();
         let boxes = tiles.iter().map(|&tile| self.grid.voxels_of_tile(tile).intersection(&wanted));
         boxes.reduce(|a, b| VoxelBox {
@@ -219,20 +233,28 @@ impl Collector<'_> {
             _ => None,
         };
         let cells = Cells::new(frame.cells[0] * frame.cells[1], layer);
-        let outcomes = tiles.par_iter().map(|&tile| {
-            let added = match self.source {
-                Source::One(map) => self.add(map, tile, &frame, &cells),
-                Source::Two { before, after } => self.add_difference(before, after, tile, &frame, &cells),
-            };
-            progress.step();
-            added.or_else(|error| self.skip(tile, error))
-        });
-        // Return the first error in tile order, so that it does not depend on the number of threads.
-        if let Some(failed) = outcomes.find_first(Result::is_err) {
-            failed?;
-        }
+        self.for_each_tile(tiles, progress, |tile| match self.source {
+            Source::One(map) => self.add(map, tile, &frame, &cells),
+            Source::Two { before, after } => self.add_difference(before, after, tile, &frame, &cells),
+        })?;
         let seen = seen(&frame, &cells);
         Ok(seen.map(|(first, count)| Known { frame, cells, first, count }))
+    }
+
+    /// Visits all tiles on the caller's rayon pool, and skips unreadable ones if the picture says so.
+    pub fn for_each_tile(
+        &self,
+        tiles: &[TileIndex],
+        progress: &Progress,
+        visit: impl Fn(TileIndex) -> Result<()> + Sync,
+    ) -> Result<()> {
+        let outcomes = tiles.par_iter().map(|&tile| {
+            let visited = visit(tile);
+            progress.step();
+            visited.or_else(|error| self.skip(tile, error))
+        });
+        // Return the first error in tile order, so that it does not depend on the number of threads.
+        outcomes.find_first(Result::is_err).unwrap_or(Ok(()))
     }
 
     fn skip(&self, tile: TileIndex, error: Error) -> Result<()> {

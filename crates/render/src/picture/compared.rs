@@ -68,6 +68,7 @@ impl Picture {
     ///
     /// As [`Picture::draw`].
     pub fn start_comparison(&self, config: &MapConfig, voxels: VoxelBox) -> Result<Drawing<'_>> {
+        self.check_flat()?;
         self.check()?;
         let frame = (!voxels.is_empty()).then(|| Frame::new(self.view, voxels, self.most_px));
         let known = frame.map(|frame| {

@@ -12,11 +12,9 @@ use super::options::Picture;
 use super::palette::{self, Rgb, lit, mixed};
 use super::pane::Pane;
 use super::theme::Theme;
-use super::time_labels::short_time_labels;
 use super::trajectory::draw_trajectory;
+use super::values::Values;
 use super::view::{Change, ColorBy};
-use crate::Layer;
-use crate::classes::{class_color, class_label};
 use std::collections::BTreeMap;
 use voxtile::space::{Aabb, Grid, Point, TileIndex};
 use voxtile::{Layers, MapConfig};
@@ -69,7 +67,6 @@ pub struct Drawing<'a> {
 
 /// Maximum size of a voxel in pixels, for small maps.
 const LARGEST_ZOOM: usize = 48;
-const SECONDS_A_NS: f64 = 1e-9;
 /// Size of an image without a map.
 const EMPTY_SIZE: [usize; 2] = [760, 240];
 /// Width of grid lines in points.
@@ -99,7 +96,11 @@ impl<'a> Drawing<'a> {
 
     /// Draws the picture.
     pub fn finish(mut self) -> Drawn {
-        let Some(known) = self.take_known() else { return self.draw_nothing() };
+        let Some(known) = self.take_known() else {
+            let moving_points = self.moving.map(|moving| moving.points);
+            let Collected { tiles, unread, .. } = self.collected;
+            return Drawn { moving_points, ..nothing(self.picture, &self.grid, tiles, unread) };
+        };
         let (first, cells) = with_air(&known);
         let most_px = self.picture.most_px;
         let zoom = (0..2).map(|k| most_px[k] / cells[k]).min().unwrap_or(1).clamp(1, LARGEST_ZOOM);
@@ -180,36 +181,6 @@ impl<'a> Drawing<'a> {
         Some(Known { first, count, ..known })
     }
 
-    /// Draws a picture without cells.
-    fn draw_nothing(self) -> Drawn {
-        let measure = Measure::of(EMPTY_SIZE, self.picture.dpi);
-        let size = if self.picture.has_legend { EMPTY_SIZE } else { [1; 2] };
-        let theme = self.theme();
-        let mut canvas = Canvas::new(size[0], size[1], &theme);
-        if self.picture.has_legend {
-            let title = measure.title().fitted(&self.picture.title, size[0] - 40);
-            canvas.text(20, 20, measure.title(), theme.ink, &title);
-            let (text, label) = ("no observed voxels here", measure.label());
-            let left = size[0].saturating_sub(label.width_of(text)) / 2;
-            canvas.text(left, size[1] / 2, label, theme.faint_ink, text);
-        }
-        Drawn {
-            image: canvas.into_image(measure.dpi()),
-            map_px: [0; 4],
-            region_m: None,
-            cell_m: self.grid.resolution_m(),
-            cell_px: 1,
-            range: None,
-            solid_cells: 0,
-            known_cells: 0,
-            classes: Vec::new(),
-            cells_without_value: 0,
-            moving_points: self.moving.map(|moving| moving.points),
-            tiles: self.collected.tiles,
-            unread: self.collected.unread,
-        }
-    }
-
     fn theme(&self) -> Theme {
         Theme::of(self.picture.background)
     }
@@ -245,47 +216,13 @@ impl<'a> Drawing<'a> {
         if self.collected.content == Content::Comparison {
             return legend_entries();
         }
-        let class =
-            |&(class, _): &(u8, u64)| Entry { color: Some(class_color(class)), label: class_label(class) };
-        let mut entries: Vec<Entry> = classes.iter().map(class).collect();
-        if let (ColorBy::Layer(layer), 1..) = (self.picture.color_by, cells_without_value) {
-            let name = match layer {
-                Layer::Colour => "color",
-                layer => layer.name(),
-            };
-            entries.push(Entry { color: Some(palette::NO_VALUE), label: format!("no {name}") });
-        }
-        if let (ColorBy::Layer(Layer::Time), Some(range)) = (self.picture.color_by, self.range)
-            && let (_, Some(date)) = short_time_labels(range)
-        {
-            entries.push(Entry { color: None, label: format!("last hit: {date} UTC") });
-        }
+        let mut entries = self.values().entries(classes, cells_without_value);
         entries.extend(self.moving.as_ref().map(|moving| moving_entry(moving.points)));
         entries
     }
 
-    /// Returns a value of a layer as a number: an intensity in the unit of the points, a time in seconds.
-    fn number_of(&self, value: LayerValue) -> Option<f64> {
-        match value {
-            LayerValue::Intensity(share) => Some(share * f64::from(self.layers.intensity_max.unwrap_or(1.0))),
-            LayerValue::Time(ns) => Some(ns as f64 * SECONDS_A_NS),
-            LayerValue::Colour(_) | LayerValue::Class(_) => None,
-        }
-    }
-
-    /// Returns the range of a layer: from the 2nd to the 98th percentile of intensities, and of all times.
-    fn layer_range(&self, known: &Known) -> Option<[f64; 2]> {
-        let layer = known.cells.layer.as_ref()?;
-        let cells = known.cells.iter().enumerate().filter(|(_, cell)| cell.rank == Rank::Occupied);
-        let mut values: Vec<f64> =
-            cells.filter_map(|(place, _)| layer.at(place).and_then(|value| self.number_of(value))).collect();
-        values.sort_unstable_by(f64::total_cmp);
-        let (least, apart) = match self.picture.color_by {
-            ColorBy::Layer(Layer::Time) => (0, 1.0),
-            _ => (values.len() / 50, 1e-6 * f64::from(self.layers.intensity_max.unwrap_or(1.0))),
-        };
-        let most = values.len().checked_sub(1 + least)?;
-        Some([values[least], values[most].max(values[least] + apart)])
+    fn values(&self) -> Values<'_> {
+        Values { picture: self.picture, layers: self.layers, range: self.range }
     }
 
     /// Returns the values of the first and the last color. Up to 2 % of the cells at either end may be outside the
@@ -299,15 +236,15 @@ impl<'a> Drawing<'a> {
             ColorBy::Distance => return Some([0.0, self.collected.max_distance_m]),
             ColorBy::Height => Rank::Occupied,
             ColorBy::Count | ColorBy::LastScan => Rank::Free,
-            ColorBy::Layer(_) => return self.layer_range(known),
+            ColorBy::Layer(_) => {
+                let layer = known.cells.layer.as_ref()?;
+                let cells = known.cells.iter().enumerate().filter(|(_, cell)| cell.rank == Rank::Occupied);
+                let values = cells.filter_map(|(place, _)| self.values().number_of(layer.at(place)?));
+                return self.values().range_of(values.collect());
+            }
         };
         let cells = known.cells.iter().filter(|cell| cell.rank >= least);
-        let mut values: Vec<f32> = cells.map(|cell| cell.value).collect();
-        values.sort_unstable_by(f32::total_cmp);
-        let few = values.len() / 50;
-        let (least, most) = (values.get(few)?, values.get(values.len().checked_sub(1 + few)?)?);
-        let apart = if self.picture.color_by == ColorBy::Height { 0.01 } else { 1.0 };
-        Some([f64::from(*least), f64::from(*most).max(f64::from(*least) + apart)])
+        self.values().range_of(cells.map(|cell| f64::from(cell.value)).collect())
     }
 
     fn draw_cells(&self, canvas: &mut Canvas, known: &Known, pane: &Pane) {
@@ -325,16 +262,9 @@ impl<'a> Drawing<'a> {
 
     /// Returns the color of a cell before shading; `None` if it is unknown.
     fn color(&self, known: &Known, at: [usize; 2], cell: Cell) -> Option<Rgb> {
-        let color_by_value = |value: f64| {
-            let [least, most] = self.range.unwrap_or([0.0, 1.0]);
-            self.picture.color_map.color_of(match self.picture.color_by {
-                // Logarithmic: most voxels have few observations, some have very many.
-                ColorBy::Count => ((value + 1.0) / (least + 1.0)).ln() / ((most + 1.0) / (least + 1.0)).ln(),
-                _ => (value - least) / (most - least),
-            })
-        };
+        let values = self.values();
         let theme = self.theme();
-        let value_color = || color_by_value(f64::from(cell.value));
+        let value_color = || values.color_of(f64::from(cell.value));
         match cell.rank {
             Rank::Unknown => None,
             Rank::Changed(Change::Same) => Some(palette::SAME),
@@ -343,12 +273,7 @@ impl<'a> Drawing<'a> {
             Rank::Compared(class) | Rank::InFront(class) => color_of_rank(class),
             Rank::Occupied if self.picture.color_by == ColorBy::Distance => Some(theme.ink),
             Rank::Occupied => Some(match &known.cells.layer {
-                Some(layer) => match layer.at(known.place(at)) {
-                    Some(LayerValue::Colour(color)) => color,
-                    Some(LayerValue::Class(class)) => class_color(class),
-                    Some(value) => self.number_of(value).map_or(palette::NO_VALUE, color_by_value),
-                    None => palette::NO_VALUE,
-                },
+                Some(layer) => values.color_of_layer(layer.at(known.place(at))),
                 None => value_color(),
             }),
             Rank::Free => match self.picture.color_by {
@@ -429,4 +354,34 @@ fn with_air(known: &Known) -> ([usize; 2], [usize; 2]) {
     let first: [usize; 2] = std::array::from_fn(|k| known.first[k].saturating_sub(air));
     let end = |k: usize| (known.first[k] + known.count[k] + air).min(known.frame.cells[k]);
     (first, std::array::from_fn(|k| end(k) - first[k]))
+}
+
+/// Returns a picture without voxels.
+pub(super) fn nothing(picture: &Picture, grid: &Grid, tiles: u64, unread: Vec<TileIndex>) -> Drawn {
+    let measure = Measure::of(EMPTY_SIZE, picture.dpi);
+    let size = if picture.has_legend { EMPTY_SIZE } else { [1; 2] };
+    let theme = Theme::of(picture.background);
+    let mut canvas = Canvas::new(size[0], size[1], &theme);
+    if picture.has_legend {
+        let title = measure.title().fitted(&picture.title, size[0] - 40);
+        canvas.text(20, 20, measure.title(), theme.ink, &title);
+        let (text, label) = ("no observed voxels here", measure.label());
+        let left = size[0].saturating_sub(label.width_of(text)) / 2;
+        canvas.text(left, size[1] / 2, label, theme.faint_ink, text);
+    }
+    Drawn {
+        image: canvas.into_image(measure.dpi()),
+        map_px: [0; 4],
+        region_m: None,
+        cell_m: grid.resolution_m(),
+        cell_px: 1,
+        range: None,
+        solid_cells: 0,
+        known_cells: 0,
+        classes: Vec::new(),
+        cells_without_value: 0,
+        moving_points: None,
+        tiles,
+        unread,
+    }
 }

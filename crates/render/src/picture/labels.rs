@@ -19,6 +19,14 @@ pub fn labels(color_by: ColorBy, [least, most]: [f64; 2]) -> (&'static str, [Str
     }
 }
 
+/// Returns the name of a layer in a legend.
+pub fn layer_name(layer: Layer) -> &'static str {
+    match layer {
+        Layer::Colour => "color",
+        layer => layer.name(),
+    }
+}
+
 /// Formats a number with a comma before every third digit.
 pub fn grouped(number: u64) -> String {
     let digits = number.to_string();

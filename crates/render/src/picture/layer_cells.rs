@@ -66,18 +66,14 @@ impl LayerCells {
 
     /// Returns the value of a cell; `None` if its nearest voxels have none.
     pub fn at(&self, place: usize) -> Option<LayerValue> {
-        let sum = self.blocks.get(place / BLOCK)?.lock()[place % BLOCK].sum;
-        Some(match sum {
-            Sum::None => return None,
-            Sum::Colour { sums, voxels } => {
-                LayerValue::Colour(sums.map(|sum| (sum.saturating_add(voxels / 2) / voxels).min(255) as u8))
-            }
-            Sum::Intensity { sum, voxels } => {
-                LayerValue::Intensity(sum as f64 / f64::from(voxels) / f64::from(u16::MAX))
-            }
-            Sum::Class { class, .. } => LayerValue::Class(class),
-            Sum::Time { last_ns } => LayerValue::Time(last_ns),
-        })
+        self.blocks.get(place / BLOCK)?.lock()[place % BLOCK].sum.value()
+    }
+}
+
+impl LayerValue {
+    /// Returns the value of a voxel; `None` if it has none.
+    pub fn of(layer: Layer, layers: &VoxelLayers) -> Option<Self> {
+        Sum::of(layer, layers).value()
     }
 }
 
@@ -100,6 +96,20 @@ impl Sum {
             }
             Layer::Time => layers.time.map_or(Self::None, |time| Self::Time { last_ns: time.last_ns }),
         }
+    }
+
+    fn value(self) -> Option<LayerValue> {
+        Some(match self {
+            Self::None => return None,
+            Self::Colour { sums, voxels } => {
+                LayerValue::Colour(sums.map(|sum| (sum.saturating_add(voxels / 2) / voxels).min(255) as u8))
+            }
+            Self::Intensity { sum, voxels } => {
+                LayerValue::Intensity(sum as f64 / f64::from(voxels) / f64::from(u16::MAX))
+            }
+            Self::Class { class, .. } => LayerValue::Class(class),
+            Self::Time { last_ns } => LayerValue::Time(last_ns),
+        })
     }
 
     fn plus(self, other: Self) -> Self {

@@ -146,22 +146,19 @@ impl Legend {
             let is_north = self.has_north && *name == "y";
             pen.arrow(start, to.map(|k| k * arm), ink);
             let name = if is_north { "y, north" } else { name };
-            let gap = arm + measure.exact_px(4.0);
             let length = to[0].hypot(to[1]).max(1e-9);
-            let middle: [f64; 2] =
-                std::array::from_fn(|k| start[k] + to[k] * arm + to[k] / length * (gap - arm));
-            let wide = label.width_of(name) as f64;
+            let [wide, high] = [label.width_of(name), label.height()].map(|px| px as f64);
+            // Beyond the tip, and above it if the arrow is steep.
+            let gap = measure.exact_px(4.0);
+            let tip: [f64; 2] = std::array::from_fn(|k| start[k] + to[k] * arm + to[k] / length * gap);
             let left = match to[0] / length {
-                right if right > 0.3 => middle[0],
-                right if right < -0.3 => middle[0] - wide,
-                // Next to the tip of a vertical arrow.
-                _ => start[0] + measure.exact_px(4.0),
+                right if right > 0.5 => tip[0],
+                right if right < -0.5 => tip[0] - wide,
+                // A long name is aligned with its arrow.
+                _ if is_north => tip[0] - 0.2 * high,
+                _ => tip[0] - 0.5 * wide,
             };
-            let top = if to[0].abs() > 0.3 * length {
-                middle[1] - 0.5 * label.height() as f64
-            } else {
-                start[1] + to[1] * arm - measure.exact_px(1.0)
-            };
+            let top = if to[1] / length < -0.8 { tip[1] - high } else { tip[1] - 0.5 * high };
             pen.canvas.text(left.max(0.0) as usize, top.max(0.0) as usize, label, ink, name);
         }
     }
@@ -170,8 +167,7 @@ impl Legend {
         let (measure, label, ink) = (pen.measure, pen.measure.label(), pen.theme.ink);
         let length_m = round_length_m(pen.canvas.width() as f64 * 0.2 * self.metres_a_pixel);
         let length = ((length_m / self.metres_a_pixel).round() as usize).max(1);
-        let north = if self.has_north { label.width_of(", north") } else { 0 };
-        let (left, bottom) = (measure.px(MARGIN + 36.0) + north, pen.foot + measure.px(BOTTOM));
+        let (left, bottom) = (measure.px(MARGIN + 36.0), pen.foot + measure.px(BOTTOM));
         let [top, line] = pen.rows();
         let (thick, end) = (measure.px(1.4), measure.px(5.0));
         pen.canvas.text(left, top, label, ink, &length_label(length_m));

@@ -4,9 +4,10 @@
 //! Picture   options                                            options, view
 //! Frame     voxels of each cell                                frame
 //! Cells     the best observation of each cell                  cells, layer_cells, collect
-//! Drawing   cells, grid, moving points, trajectory             drawing, layout, pane, moving, trajectory
+//! Drawing   cells, grid, moving points, trajectory             drawing, layout, pane, values, moving, trajectory
 //! Legend    axes, scale bar, colors                            legend, labels, scale, time_labels
 //! Canvas    pixels, boxes, lines, text                         canvas, typeface, measure, theme, palette, image
+//! oblique   views from a direction between above and the side
 //! compared  classes of the voxels of two maps, and boxes around changes
 //! OverTime  panels of a local map at several times             over_time
 //! ```
@@ -24,6 +25,7 @@ mod layout;
 mod legend;
 mod measure;
 mod moving;
+mod oblique;
 mod options;
 mod over_time;
 mod palette;
@@ -33,6 +35,7 @@ mod theme;
 mod time_labels;
 mod trajectory;
 mod typeface;
+mod values;
 mod view;
 
 pub use drawing::{Drawing, Drawn};

@@ -1,5 +1,6 @@
 use super::collect::{Collected, Source};
 use super::drawing::{Drawing, Drawn};
+use super::oblique;
 use super::theme::Background;
 use super::view::{ColorBy, View};
 use crate::ColorMap;
@@ -11,7 +12,7 @@ use voxtile_distance::DistanceOptions;
 /// Options of a picture of a map.
 ///
 /// Memory: 12 bytes per cell (44 with the colors of a layer, one more with moving points), 4 per pixel, and one tile
-/// per thread, whatever the size of the map.
+/// per thread, whatever the size of the map. An oblique view needs 36 bytes per pixel, or 12 beyond 8 million pixels.
 #[derive(Clone, Debug)]
 pub struct Picture {
     pub(super) view: View,
@@ -126,6 +127,10 @@ impl Picture {
     ///
     /// Fails if a tile cannot be read, if the map has no values for the color, or if a height or region is invalid.
     pub fn draw(&self, map: &dyn MapView, progress: impl Fn(u64, u64) + Sync) -> Result<Drawn> {
+        if let View::Oblique { azimuth_deg, elevation_deg } = self.view {
+            self.check_map(map)?;
+            return oblique::draw(self, oblique::Camera::new(azimuth_deg, elevation_deg), map, &progress);
+        }
         Ok(self.start(map, progress)?.finish())
     }
 
@@ -133,8 +138,16 @@ impl Picture {
     ///
     /// # Errors
     ///
-    /// As [`Picture::draw`].
+    /// As [`Picture::draw`], and with [`View::Oblique`].
     pub fn start(&self, map: &dyn MapView, progress: impl Fn(u64, u64) + Sync) -> Result<Drawing<'_>> {
+        self.check_flat()?;
+        self.check_map(map)?;
+        let collected = Collected::of(self, Source::One(map), &progress)?;
+        Ok(Drawing::new(self, map.config(), collected))
+    }
+
+    /// Checks the options and that the map has values for the color.
+    fn check_map(&self, map: &dyn MapView) -> Result<()> {
         self.check()?;
         if self.color_by == ColorBy::Distance {
             return Err(Error::argument("color", "distances are drawn by `start_distances`"));
@@ -148,8 +161,17 @@ impl Picture {
         if let ColorBy::Layer(layer) = self.color_by {
             layer.check(&map.config().layers())?;
         }
-        let collected = Collected::of(self, Source::One(map), &progress)?;
-        Ok(Drawing::new(self, map.config(), collected))
+        Ok(())
+    }
+
+    /// Checks that the picture has cells.
+    pub(super) fn check_flat(&self) -> Result<()> {
+        match self.view {
+            View::Oblique { .. } => {
+                Err(Error::argument("view", "an oblique view shows a single map, without points"))
+            }
+            _ => Ok(()),
+        }
     }
 
     /// Draws the difference of two maps or states of a map: voxels occupied in both, only before, or only after, in
@@ -180,6 +202,7 @@ impl Picture {
         after: &dyn MapView,
         progress: impl Fn(u64, u64) + Sync,
     ) -> Result<Drawing<'_>> {
+        self.check_flat()?;
         self.check()?;
         let [grid_before, grid] = [before, after].map(|map| map.config().grid);
         if grid_before != grid {
@@ -218,6 +241,12 @@ impl Picture {
             && !(z_m.is_finite() && thickness_m.is_finite() && thickness_m >= 0.0)
         {
             return Err(Error::argument("slice", "needs a height and a thickness of at least 0, in metres"));
+        }
+        if let View::Oblique { azimuth_deg, elevation_deg } = self.view
+            && !(azimuth_deg.is_finite() && (0.0..=90.0).contains(&elevation_deg))
+        {
+            let reason = "needs an azimuth in degrees, and an elevation of 0 to 90 degrees";
+            return Err(Error::argument("view", reason));
         }
         match self.region {
             Some(region) if (0..3).any(|k| region.min[k].is_nan() || region.max[k].is_nan()) => {

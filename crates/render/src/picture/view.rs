@@ -17,6 +17,14 @@ pub enum View {
     },
     /// From a side, z up.
     Side(SideAxis),
+    /// From a direction between above and the side, with shades; lengths along the image have one scale. Only occupied
+    /// voxels are drawn. Up to 0.5 % of them may be beyond each border of the image, unless a region is set.
+    Oblique {
+        /// Direction from the map to the viewer, counterclockwise from x, in degrees.
+        azimuth_deg: f64,
+        /// Angle of this direction above the horizon, 0 to 90 degrees.
+        elevation_deg: f64,
+    },
 }
 
 /// Axis to the right in a view from a side.
@@ -63,7 +71,7 @@ impl View {
     /// Returns the axes to the right and up.
     pub(super) fn axes(self) -> [usize; 2] {
         match self {
-            Self::Above | Self::Slice { .. } => [0, 1],
+            Self::Above | Self::Slice { .. } | Self::Oblique { .. } => [0, 1],
             Self::Side(SideAxis::X) => [0, 2],
             Self::Side(SideAxis::Y) => [1, 2],
         }
@@ -72,7 +80,7 @@ impl View {
     /// Returns a number that increases towards the viewer.
     pub(super) fn nearness(self, voxel: VoxelIndex) -> i32 {
         match self {
-            Self::Above | Self::Slice { .. } => voxel[2],
+            Self::Above | Self::Slice { .. } | Self::Oblique { .. } => voxel[2],
             // The complement reverses the order and exists for every index.
             Self::Side(SideAxis::X) => !voxel[1],
             Self::Side(SideAxis::Y) => voxel[0],
