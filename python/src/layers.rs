@@ -7,6 +7,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use voxtile::mapper::MapView;
 use voxtile::{Layers, MapConfig, PointAttributes, Result, Stop, VoxelLayers};
+use voxtile_render::ColorMap;
 use voxtile_render::classes::{class_color, class_label};
 
 /// Reads layers from a text, such as `"colour,class"`, or from a sequence of names.
@@ -23,6 +24,16 @@ pub fn layers_of(layers: &Bound<'_, PyAny>) -> PyResult<Layers> {
 #[pyo3(signature = (class, /))]
 pub fn class_style(class: u8) -> (String, (u8, u8, u8)) {
     (class_label(class), class_color(class).into())
+}
+
+/// Colors of a color map at even distances, as red, green and blue, 0 to 255. Raises ValueError for an unknown name.
+#[pyfunction]
+#[pyo3(signature = (name, /))]
+pub fn color_map(py: Python<'_>, name: &str) -> PyResult<Vec<(u8, u8, u8)>> {
+    let names = || ColorMap::all().iter().map(|map| map.name).collect::<Vec<_>>().join(", ");
+    let map = ColorMap::named(name)
+        .ok_or_else(|| wrong(py, "color_map", format!("{name:?} is none of {}", names())))?;
+    Ok(map.stops.iter().map(|&stop| stop.into()).collect())
 }
 
 /// Takes the attributes of `points` points: colours as an array of N x 3 numbers from 0 to 255, classes as N numbers

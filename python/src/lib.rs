@@ -61,7 +61,7 @@ mod _voxtile {
     #[pymodule_export]
     use super::frontiers::Frontier;
     #[pymodule_export]
-    use super::layers::class_style;
+    use super::layers::{class_style, color_map};
     #[pymodule_export]
     use super::local_map::LocalMap;
     #[pymodule_export]

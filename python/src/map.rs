@@ -30,6 +30,7 @@ use voxtile::{
 };
 use voxtile_distance::MapDistances;
 use voxtile_pipeline::place::{check_is_folder, place_of};
+use voxtile_render::Roof;
 
 /// Up to this many queries, or points to insert, start on the calling thread and move to another one only if they take
 /// long.
@@ -705,6 +706,17 @@ impl Map {
     fn digest(&self, py: Python<'_>) -> PyResult<String> {
         let digest = self.ask(py, usize::MAX, |source, stop| source.ask(stop, |map| map.digest()))?;
         Ok(digest.to_string())
+    }
+
+    /// Height in metres at which pictures from above cut the ceiling: that of the sensor, if most columns around the
+    /// trajectory are roofed; else None.
+    #[pyo3(name = "_ceiling")]
+    fn ceiling(&self, py: Python<'_>) -> PyResult<Option<f64>> {
+        let source = self.source(py)?;
+        watched(py, |stop| {
+            let path = source.trajectory(&self.path)?;
+            source.ask(stop, |view| Ok(Roof::of(view, &path)?.and_then(|roof| roof.cut_m())))
+        })
     }
 
     /// Draws the map from above with matplotlib; see `voxtile.pictures.plot`.

@@ -5,6 +5,7 @@ use parking_lot::{Mutex, MutexGuard, RwLock};
 use std::path::Path;
 use std::time::Duration;
 use voxtile::mapper::{LiveReader, MapReader, MapView, Mapper, OctreeMap, Stoppable};
+use voxtile::space::Point;
 use voxtile::store::Extension;
 use voxtile::{Error, MapConfig, OutOfCoreTileMapper, Result, Stop};
 use voxtile_compare::Viewpoints;
@@ -80,6 +81,16 @@ impl Source {
             Self::Reader(reader) => kept_viewpoints(&reader.read()),
             Self::Writer { .. } | Self::Octree(_) => None,
         }
+    }
+
+    /// Returns the positions of the sensor of the map at `path`, at its last flush.
+    pub fn trajectory(&self, path: &Path) -> Result<Vec<Point>> {
+        let scans = match self {
+            Self::Reader(reader) => reader.read().scans()?,
+            Self::Writer { .. } => MapReader::open(path, LEAST_BYTES)?.scans()?,
+            Self::Octree(_) => Vec::new(),
+        };
+        Ok(scans.iter().map(|scan| scan.origin_m).collect())
     }
 
     /// Returns the configuration of the map.

@@ -8,11 +8,13 @@ import re
 import struct
 import zlib
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 import voxtile
 from numpy.typing import NDArray
+from voxtile import _voxtile
 
 
 @pytest.fixture
@@ -128,6 +130,39 @@ def test_a_plot_shows_times(tmp_path: Path) -> None:
     times = figure.axes[0].images[0].get_array()
     assert np.allclose(times[~np.isnan(times)], [0.0, 12.5])
     assert figure.axes[1].get_ylabel() == "last hit in s after 2011-09-26 13:04:32 UTC"
+
+
+@pytest.mark.parametrize("mode", ["r", "r+"])
+def test_a_plot_of_a_room_has_no_ceiling(tmp_path: Path, mode: Any) -> None:
+    pytest.importorskip("matplotlib")
+    x, y = (k.ravel() for k in np.meshgrid(np.arange(-3, 3, 0.1), np.arange(-2, 2, 0.1)))
+    walls = [np.stack([x, np.full(x.size, at), np.abs(y) - 1.2], 1) for at in (-2.05, 2.05)]
+    floor, ceiling = (np.stack([x, y, np.full(x.size, z)], 1) for z in (-1.25, 1.75))
+    for name, points in (("room", [floor, ceiling, *walls]), ("open", [floor, *walls])):
+        with voxtile.Map.create(tmp_path / name, 0.1) as made:
+            made.insert(np.concatenate(points), origin=[0.05, 0.05, 0.05])
+    with voxtile.open(tmp_path / "room", mode) as found:
+        cut, whole, low = (found.plot(max_height=height) for height in ("auto", None, -1.0))
+        with pytest.raises(ValueError, match="max_height: 'high'"):
+            found.plot(max_height="high")
+    assert cut.axes[0].get_title() == "ceiling cut at 0.05 m, the height of the sensor"
+    assert np.nanmax(cut.axes[0].images[0].get_array()) < 0.05
+    assert whole.axes[0].get_title() == low.axes[0].get_title() == ""
+    assert np.nanmax(whole.axes[0].images[0].get_array()) > 1.6
+    assert np.nanmax(low.axes[0].images[0].get_array()) < -1.0
+    with voxtile.open(tmp_path / "open", mode) as found:
+        assert found.plot().axes[0].get_title() == ""
+
+
+def test_a_plot_has_the_colors_of_a_map_by_name(room: Path) -> None:
+    pytest.importorskip("matplotlib")
+    with voxtile.open(room) as found:
+        for name, last in (("voxtile", None), ("gray", None), ("cividis", None), ("plasma", (240, 249, 33))):
+            shown = found.plot(color_map=name).axes[0].images[0].get_cmap()
+            wanted = np.divide(last or _voxtile.color_map(name)[-1], 255)
+            assert np.allclose(shown(1.0)[:3], wanted, atol=0.005), name
+        with pytest.raises(ValueError, match="'heat' is none of voxtile, viridis"):
+            found.plot(color_map="heat")
 
 
 def test_a_plot_is_a_picture_in_a_notebook(room: Path) -> None:

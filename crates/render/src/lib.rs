@@ -28,6 +28,7 @@ mod layer;
 pub mod levels;
 mod oklab;
 mod picture;
+mod roof;
 #[cfg(test)]
 mod sight;
 mod survey;
@@ -38,4 +39,5 @@ pub use picture::{
     Background, Change, ColorBy, Drawing, Drawn, Image, OverTime, Panel, Picture, SideAxis, View, colors,
     is_unix_time, time_labels,
 };
+pub use roof::Roof;
 pub use survey::{HeightBin, Survey};

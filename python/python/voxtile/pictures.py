@@ -14,10 +14,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ._voxtile import Comparison, Map, class_style
+from ._voxtile import Comparison, Map, class_style, color_map as stops_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.colors import Colormap
     from matplotlib.figure import Figure
 
 _MOST_PIXELS = 2048
@@ -37,7 +38,14 @@ class _Columns:
     picture.
     """
 
-    def __init__(self, map: Map, region: Any, min_probability: float | None, max_pixels: int) -> None:
+    def __init__(
+        self,
+        map: Map,
+        region: Any,
+        min_probability: float | None,
+        max_pixels: int,
+        max_height: float | None = None,
+    ) -> None:
         self.map = map
         self.extent = (0.0, 1.0, 0.0, 1.0)
         self.tops = np.full((1, 1, 3), np.nan)
@@ -50,6 +58,8 @@ class _Columns:
         tops = np.full((rows * columns, 3), -np.inf)
         for _, centers, _ in map.occupied_by_tile(min_probability):
             inside = centers[((low <= centers) & (centers < high)).all(axis=1)]
+            if max_height is not None:
+                inside = inside[inside[:, 2] < max_height]
             at = np.floor((inside[:, :2] - low[:2]) / edge).astype(int)
             at = np.minimum(at[:, 1], rows - 1) * columns + np.minimum(at[:, 0], columns - 1)
             # The last one of an element is the highest.
@@ -108,6 +118,8 @@ def plot(
     map: Map,
     *,
     color: str = "height",
+    color_map: str = "voxtile",
+    max_height: float | str | None = "auto",
     region: Any = None,
     min_probability: float | None = None,
     ax: Axes | None = None,
@@ -115,9 +127,11 @@ def plot(
     """Draws the map from above: the highest occupied voxel of each column.
 
     ``color`` is ``"height"`` in metres, or a layer of the map: ``"rgb"``, ``"intensity"``, ``"class"``, or ``"age"`` (the
-    time of the last hit). ``region`` is a box, lower and upper corner; ``ax`` are axes to draw into. Needs matplotlib.
-    Returns the figure. A notebook shows it as the result of a cell, or with ``display``; in a program, ``savefig`` writes
-    it.
+    time of the last hit). ``color_map`` has the colors of values: a name of ``voxtile picture --color-map``, or one of
+    matplotlib. Only voxels below ``max_height`` in metres are drawn; ``"auto"`` cuts the ceiling of rooms, at the height of
+    the sensor, if most columns around the trajectory are roofed. ``region`` is a box, lower and upper corner; ``ax`` are
+    axes to draw into. Needs matplotlib. Returns the figure. A notebook shows it as the result of a cell, or with
+    ``display``; in a program, ``savefig`` writes it.
     """
     from matplotlib.figure import Figure as NewFigure
     from matplotlib.patches import Patch
@@ -128,7 +142,11 @@ def plot(
             raise ValueError(f"color: {color!r} is none of height, {', '.join(_LAYERS)}")
         if name not in map.layers:
             raise ValueError(f"color: {color!r} needs the layer {name}; build a map with layers={name!r}")
-    columns = _Columns(map, region, min_probability, _MOST_PIXELS)
+    if isinstance(max_height, str) and max_height != "auto":
+        raise ValueError(f"max_height: {max_height!r} is not auto, None, or a height in metres")
+    colors_of_values = _color_map(color_map)
+    cut = map._ceiling() if isinstance(max_height, str) else max_height
+    columns = _Columns(map, region, min_probability, _MOST_PIXELS, cut)
     figure = NewFigure(figsize=(8, 6)) if ax is None else ax.figure
     axes = figure.add_subplot() if ax is None else ax
     draw = functools.partial(axes.imshow, origin="lower", extent=columns.extent, interpolation="nearest")
@@ -147,8 +165,10 @@ def plot(
             axes.legend(handles=patches, loc="upper left", bbox_to_anchor=(1.0, 1.0), frameon=False)
     else:
         values, label, ends = _scale(columns, color)
-        image = draw(values, cmap="viridis", vmin=ends[0], vmax=ends[1])
+        image = draw(values, cmap=colors_of_values, vmin=ends[0], vmax=ends[1])
         figure.colorbar(image, ax=axes, label=label)
+    if cut is not None and max_height == "auto":
+        axes.set_title(f"ceiling cut at {cut:.2f} m, the height of the sensor", fontsize="medium")
     axes.set_xlabel("x in m")
     axes.set_ylabel("y in m")
     axes.set_aspect("equal")
@@ -159,15 +179,27 @@ def plot(
     return whole
 
 
+def _color_map(name: str) -> Colormap:
+    """Returns a color map of voxtile, or of matplotlib if voxtile has none of this name."""
+    from matplotlib import colormaps
+    from matplotlib.colors import LinearSegmentedColormap
+
+    try:
+        stops = np.divide(stops_of(name), 255)
+    except ValueError:
+        if name in colormaps:
+            return colormaps[name]
+        raise
+    return LinearSegmentedColormap.from_list(name, stops.tolist())
+
+
 def _scale(columns: _Columns, color: str) -> tuple[NDArray[np.float64], str, tuple[float | None, float | None]]:
     """Returns values, their name, and the ends of the scale."""
-    if color == "height":
-        return columns.heights, "height in m", (None, None)
-    if color == "intensity":
-        values = columns.values(columns.layer("intensity"))
+    if color in ("height", "intensity"):
+        values = columns.heights if color == "height" else columns.values(columns.layer("intensity"))
         known = values[~np.isnan(values)]
         low, high = np.percentile(known, [2, 98]) if len(known) else (0.0, 1.0)
-        return values, "intensity", (float(low), float(high))
+        return values, "height in m" if color == "height" else color, (float(low), float(high))
     last_ns = columns.layer("last_ns")
     is_known = last_ns > np.iinfo(np.int64).min
     first_ns = int(last_ns[is_known].min()) if is_known.any() else 0
@@ -228,11 +260,10 @@ def _table_html(head: list[str], rows: list[list[str]]) -> str:
 
 def _picture_html(map: Map) -> str:
     try:
-        from matplotlib import colormaps
         from matplotlib.image import imsave
     except ImportError:
         return ""
-    columns = _Columns(map, None, None, 256)
+    columns = _Columns(map, None, None, 256, map._ceiling())
     values = columns.heights
     if np.isnan(values).all():
         return ""
@@ -242,7 +273,7 @@ def _picture_html(map: Map) -> str:
         return _image_html(png)
     # Unknown columns are white: on a dark page, a transparent background would hide the shape of the map. They are masked,
     # because some versions of matplotlib take the range of colors from NaN.
-    colors = colormaps["viridis"].with_extremes(bad="white")
+    colors = _color_map("voxtile").with_extremes(bad="white")
     imsave(png, np.ma.masked_invalid(values), origin="lower", format="png", cmap=colors)
     return _image_html(png)
 

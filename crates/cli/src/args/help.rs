@@ -9,6 +9,9 @@ pub const NEW_MAP: &str = "Folder of the new map; must not exist yet";
 pub const JSON: &str = "Print the result as JSON";
 pub const STORAGE: &str = "Storage format of the tiles of the new map";
 pub const COLOR: &str = "Value shown by color";
+pub const MAX_HEIGHT: &str = "Draw only voxels below this height, in metres, or none. By default views from above cut the \
+                              ceiling of rooms: at the height of the sensor, if most columns around the trajectory \
+                              are roofed";
 pub const VOXELS_IN_BOX: &str =
     "Only voxels whose center is in this box (X0 <= x < X1, same for y and z), in metres";
 pub const MEMORY: &str = "Memory budget for everything that grows with the map or with a scan, such as 256MiB or 1GB; \

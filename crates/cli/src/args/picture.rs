@@ -1,4 +1,4 @@
-use super::{ColorName, help};
+use super::{ColorName, MaxHeight, help};
 use clap::builder::{PossibleValue, PossibleValuesParser};
 use clap::{Args, ValueEnum};
 use std::path::PathBuf;
@@ -40,6 +40,8 @@ pub struct PictureArgs {
     pub color_map: Option<String>,
     #[arg(long, value_names = ["X0", "Y0", "Z0", "X1", "Y1", "Z1"], num_args = 6, help = help::VOXELS_IN_BOX)]
     pub region: Option<Vec<f64>>,
+    #[arg(long, value_name = "Z|none", default_value = "auto", allow_hyphen_values = true, help = help::MAX_HEIGHT)]
+    pub max_height: MaxHeight,
     /// Maximum length of the map's longer edge, in pixels, 16 to 16384
     #[arg(long, value_name = "PIXELS", default_value = "2048", value_parser = clap::value_parser!(u16).range(16..=16384))]
     pub size: u16,
@@ -101,6 +103,8 @@ pub struct ReportArgs {
     /// HTML file to write; - is standard output
     #[arg(short = 'o', long = "output", value_name = "FILE")]
     pub output: PathBuf,
+    #[arg(long, value_name = "Z|none", default_value = "auto", allow_hyphen_values = true, help = help::MAX_HEIGHT)]
+    pub max_height: MaxHeight,
     /// Skip the check of every file for damage, which reads the whole map once more
     #[arg(long)]
     pub no_verify: bool,

@@ -27,6 +27,8 @@ pub struct DrawnJson {
     /// Map's rectangle in the image: left, top, width, height.
     map_px: [usize; 4],
     region_m: Option<Aabb>,
+    /// Height limit; `None` if there is none.
+    max_height_m: Option<f64>,
     cell_m: f64,
     cell_px: usize,
     /// Values of the first and the last color.
@@ -64,6 +66,7 @@ impl DrawnJson {
             dpi: drawn.image.dpi(),
             map_px: drawn.map_px,
             region_m: drawn.region_m,
+            max_height_m: drawn.max_height_m,
             cell_m: drawn.cell_m,
             cell_px: drawn.cell_px,
             range: drawn.range,

@@ -1,13 +1,15 @@
 //! `voxtile picture`: draws a map as a PNG.
 
+mod ceiling;
 mod drawn_json;
 mod moving;
 
-use crate::args::{BackgroundName, ColorName, PictureArgs, ViewName};
+use crate::args::{BackgroundName, ColorName, MaxHeight, PictureArgs, ViewName};
 use crate::json;
 use crate::part::region_of;
 use crate::progress::Progress;
 use crate::quiet::summary_out;
+pub use ceiling::Ceiling;
 use drawn_json::DrawnJson;
 use indicatif::HumanCount;
 use moving::{add_moving, map_with_marks};
@@ -40,7 +42,7 @@ pub fn run(args: &PictureArgs, is_quiet: bool) -> anyhow::Result<ExitCode> {
             check_color(map, args.color)?;
             let with_marks = map_with_marks(args, map)?;
             let progress = Progress::over_tiles(0);
-            let mut picture = complete(&picture, args, map);
+            let mut picture = complete(&picture, args, map)?;
             let on_progress = |done, all| progress.set(done, all);
             if args.from == ViewName::Oblique {
                 return Ok((picture.draw(map, on_progress)?, None));
@@ -60,7 +62,7 @@ pub fn run(args: &PictureArgs, is_quiet: bool) -> anyhow::Result<ExitCode> {
                 let with_marks = map_with_marks(args, after)?;
                 read_any_map(&before, |before| {
                     let progress = Progress::over_tiles(0);
-                    let picture = complete(&picture, args, after);
+                    let picture = complete(&picture, args, after)?;
                     let on_progress = |done, all| progress.set(done, all);
                     let drawing = picture.start_difference(before, after, on_progress)?;
                     drop(progress);
@@ -182,9 +184,13 @@ fn picture_of(args: &PictureArgs) -> Result<Picture> {
     Ok(picture)
 }
 
-/// Adds the trajectory, the title and the colors from the map.
-fn complete(picture: &Picture, args: &PictureArgs, map: &AnyMap) -> Picture {
-    let path = if args.no_path { Vec::new() } else { path_of(map) };
+/// Adds the trajectory, the height limit and the title.
+fn complete(picture: &Picture, args: &PictureArgs, map: &AnyMap) -> Result<Picture> {
+    let path = path_of(map);
+    let is_layer = args.slice.or(args.distance_slice).is_some();
+    let is_from_above = matches!(args.from, ViewName::Above | ViewName::Oblique) && !is_layer;
+    let ceiling = Ceiling::of(args.max_height, map, &path, is_from_above)?;
+    let path = if args.no_path { Vec::new() } else { path };
     let resolution_m = map.config().grid.resolution_m();
     let mut title = format!("{}: {resolution_m} m voxels", name_of(&args.map));
     if let Some(z_m) = args.slice.or(args.distance_slice) {
@@ -193,7 +199,8 @@ fn complete(picture: &Picture, args: &PictureArgs, map: &AnyMap) -> Picture {
     if let Some(since) = &args.since {
         title += &format!(", since {}", since.display());
     }
-    picture.clone().with_path(path).with_title(title)
+    title += &ceiling.caption();
+    Ok(picture.clone().with_path(path).with_title(title).with_max_height_m(ceiling.max_height_m))
 }
 
 fn check_color(map: &AnyMap, color: ColorName) -> Result<()> {
@@ -254,6 +261,12 @@ fn caption(args: &PictureArgs, drawn: &Drawn, marked: Option<u64>) -> String {
         }
         (Some(_), ColorName::Rgb | ColorName::Class) => String::new(),
     };
+    let ceiling = match (drawn.max_height_m, args.max_height) {
+        (Some(height_m), MaxHeight::Auto) => {
+            format!("; ceiling cut at {height_m:.2} m, the height of the sensor")
+        }
+        _ => String::new(),
+    };
     let changes = if args.since.is_some() { "; blue appeared, orange vanished, grey unchanged" } else { "" };
     let moving = match (marked, drawn.moving_points.unwrap_or_default()) {
         (None, _) => String::new(),
@@ -261,5 +274,5 @@ fn caption(args: &PictureArgs, drawn: &Drawn, marked: Option<u64>) -> String {
         (Some(marked), drawn) if marked == drawn => format!("; {} moving points", HumanCount(marked)),
         (Some(marked), drawn) => format!("; {} of {} moving points", HumanCount(drawn), HumanCount(marked)),
     };
-    format!("{across:.1} x {up:.1} m, {:.3} m per cell{scale}{changes}{moving}", drawn.cell_m)
+    format!("{across:.1} x {up:.1} m, {:.3} m per cell{scale}{ceiling}{changes}{moving}", drawn.cell_m)
 }

@@ -7,7 +7,7 @@ use crate::args::ReportArgs;
 use crate::counted::Counted;
 use crate::info::Info;
 use crate::json;
-use crate::picture::{name_of, path_of};
+use crate::picture::{Ceiling, name_of, path_of};
 use crate::progress::Progress;
 use std::io::{self, Write};
 use std::path::Path;
@@ -39,6 +39,7 @@ struct Content {
     survey: Survey,
     above: Drawn,
     side: Drawn,
+    ceiling: Ceiling,
     /// Pictures by the layers that the map has, with their captions.
     layers: Vec<(Drawn, &'static str)>,
     scans: std::result::Result<Vec<ScanRecord>, String>,
@@ -96,7 +97,7 @@ pub fn run(args: &ReportArgs, is_quiet: bool) -> anyhow::Result<ExitCode> {
 impl Report {
     fn of(args: &ReportArgs) -> anyhow::Result<Self> {
         let MapAt { map, snapshot } = MapAt::of(&args.map)?;
-        let (content, unreadable) = match read_any_map(&args.map, |map| Content::of(map, &args.map)) {
+        let (content, unreadable) = match read_any_map(&args.map, |map| Content::of(map, args)) {
             Ok(content) => (Some(content), None),
             Err(error) => match error.downcast_ref::<Error>() {
                 Some(Error::Damaged { .. } | Error::Malformed { .. }) => (None, Some(format!("{error:#}"))),
@@ -125,6 +126,7 @@ impl Report {
             "file": args.output.display().to_string(),
             "readable": self.content.is_some(),
             "survey": self.content.as_ref().map(|content| &content.survey),
+            "max_height_m": self.content.as_ref().and_then(|content| content.above.max_height_m),
             "damage": self.damage_count(),
             "peak_rss_bytes": memory::peak_bytes(),
         })
@@ -132,7 +134,8 @@ impl Report {
 }
 
 impl Content {
-    fn of(map: &AnyMap, path: &Path) -> anyhow::Result<Self> {
+    fn of(map: &AnyMap, args: &ReportArgs) -> anyhow::Result<Self> {
+        let path = &args.map;
         let AnyMap::Map(reader) = map else {
             let reason =
                 "is an OctoMap file; convert it with `voxtile import`, or draw it with `voxtile picture`";
@@ -142,9 +145,13 @@ impl Content {
         let on_progress = |done, all| progress.set(done, all);
         let info = Info::of(reader)?;
         let resolution_m = info.resolution_m;
-        let picture = Picture::new().with_path(path_of(map)).skipping_unreadable();
+        let trajectory = path_of(map);
+        let ceiling = Ceiling::of(args.max_height, map, &trajectory, true)?;
+        let picture = Picture::new().with_path(trajectory).skipping_unreadable();
         let title = |what: &str| format!("{} {what}: {resolution_m} m voxels", name_of(path));
-        let above = picture.clone().with_size_px(ABOVE_PX).with_title(title("from above"));
+        let above_title = title("from above") + &ceiling.caption();
+        let above = picture.clone().with_size_px(ABOVE_PX).with_title(above_title);
+        let above = above.with_max_height_m(ceiling.max_height_m);
         // Look along the shorter side, which shows the longer one.
         let is_long_in_y = info.bounds_m.is_some_and(|b| b.max[1] - b.min[1] > b.max[0] - b.min[0]);
         let axis = if is_long_in_y { SideAxis::Y } else { SideAxis::X };
@@ -170,6 +177,7 @@ impl Content {
             survey: Survey::of(reader.as_ref(), on_progress)?,
             scans: reader.scans().map_err(|error| format!("{error:#}")),
             sizes: Sizes::of(reader),
+            ceiling,
             info,
         })
     }

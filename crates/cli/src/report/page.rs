@@ -117,7 +117,10 @@ impl Content {
         write_picture(
             out,
             &self.above,
-            "From above: each column in the color of its topmost occupied voxel.",
+            &format!(
+                "From above{}: each column in the color of its topmost occupied voxel.",
+                self.ceiling.remark()
+            ),
         )?;
         for (drawn, caption) in &self.layers {
             write_picture(out, drawn, caption)?;

@@ -227,6 +227,62 @@ fn a_file_of_octomap_has_a_picture_and_no_counts() {
     assert!(code == 2 && error.contains("counts"), "{error}");
 }
 
+/// Builds a map of a room of 6 x 4 x 3 m, with or without ceiling, from its middle.
+fn room(folder: &Path, has_ceiling: bool) -> PathBuf {
+    let mut points = String::new();
+    let steps = |edge_m: f64| (0..=(edge_m * 10.0) as i32).map(move |k| f64::from(k) * 0.1 - 0.5 * edge_m);
+    for x in steps(6.0) {
+        for y in steps(4.0) {
+            points += &format!("{x} {y} -1.25\n");
+            if has_ceiling {
+                points += &format!("{x} {y} 1.75\n");
+            }
+        }
+        for z in steps(2.0) {
+            points += &format!("{x} -2 {z}\n{x} 2 {z}\n");
+        }
+    }
+    let (file, map) = (folder.join("room.xyz"), folder.join(format!("room_{has_ceiling}")));
+    fs::write(&file, points).unwrap();
+    let origin = ["--sensor-origin", "0.05", "0.05", "0.05"];
+    output(&[&["build", text(&file), "-o", text(&map)][..], &origin].concat());
+    map
+}
+
+#[test]
+fn ceilings_of_rooms_are_cut() {
+    let folder = TempDir::new().unwrap();
+    let [room, open] = [true, false].map(|has_ceiling| room(folder.path(), has_ceiling));
+    let file = folder.path().join("room.png");
+    let draw = |map: &Path, more: &[&str]| {
+        json(&[&["picture", text(map), "-o", text(&file), "--json"], more].concat())
+    };
+    for more in [&[][..], &["--from", "oblique"], &["--color", "count"]] {
+        let cut = draw(&room, more);
+        assert_eq!(cut["max_height_m"], 0.05, "{cut}");
+        assert_eq!(draw(&open, more)["max_height_m"], Value::Null);
+    }
+    assert!(draw(&room, &[])["range"][1].as_f64() < Some(0.05));
+    for more in [&["--max-height", "none"][..], &["--from", "side-x"], &["--slice", "1.75"]] {
+        let whole = draw(&room, more);
+        assert_eq!(whole["max_height_m"], Value::Null, "{more:?}");
+        assert!(whole["range"][1].as_f64() > Some(1.0), "{whole}");
+    }
+    assert_eq!(draw(&open, &["--max-height", "-1"])["range"][1].as_f64().map(|m| m < -1.0), Some(true));
+    let said = output(&["picture", text(&room), "-o", text(&file)]);
+    assert!(said.contains("ceiling cut at 0.05 m, the height of the sensor"), "{said}");
+    let page = folder.path().join("room.html");
+    let report = |more: &[&str]| {
+        let printed = json(&[&["report", text(&room), "-o", text(&page), "--json"], more].concat());
+        let page = fs::read_to_string(&page).unwrap();
+        (printed["max_height_m"].clone(), page.contains("without the ceiling, up to the sensor at 0.05 m"))
+    };
+    assert_eq!(report(&[]), (0.05.into(), true));
+    assert_eq!(report(&["--max-height", "none"]), (Value::Null, false));
+    let (code, error) = failure(&["picture", text(&room), "-o", text(&file), "--max-height", "high"]);
+    assert!(code == 2 && error.contains("a height in metres"), "{error}");
+}
+
 /// The report is valid XML with the numbers of `info`, and refers to no other resource.
 #[test]
 fn a_report_has_the_numbers_of_info() {

@@ -187,6 +187,11 @@ impl<'a> Collector<'a> {
     fn wanted(&self) -> VoxelBox {
         let all = VoxelBox { min: [i32::MIN; 3], end: [i32::MAX; 3] };
         let mut wanted = self.picture.region.as_ref().map_or(all, |region| self.grid.voxels_in(region));
+        if let Some(max_height_m) = self.picture.max_height_m {
+            let below =
+                Aabb { min: [f64::NEG_INFINITY; 3], max: [f64::INFINITY, f64::INFINITY, max_height_m] };
+            wanted.end[2] = wanted.end[2].min(self.grid.voxels_in(&below).end[2]);
+        }
         if let View::Slice { z_m, thickness_m } = self.picture.view {
             let half_m = 0.5 * thickness_m;
             let [x, y] = [0.0; 2];
@@ -241,7 +246,7 @@ impl<'a> Collector<'a> {
         Ok(seen.map(|(first, count)| Known { frame, cells, first, count }))
     }
 
-    /// Visits all tiles on the caller's rayon pool, and skips unreadable ones if the picture says so.
+    /// Visits all tiles on the caller's rayon pool, and skips unreadable ones if the picture allows it.
     pub fn for_each_tile(
         &self,
         tiles: &[TileIndex],

@@ -30,6 +30,8 @@ pub struct Drawn {
     /// Box covered by the map's part of the image, in metres; along the line of sight, the range that was searched.
     /// `None` if there was nothing to draw.
     pub region_m: Option<Aabb>,
+    /// Height limit in metres.
+    pub max_height_m: Option<f64>,
     /// Edge length of a cell in metres: one voxel or several.
     pub cell_m: f64,
     /// Edge length of a cell in pixels.
@@ -158,6 +160,7 @@ impl<'a> Drawing<'a> {
             image: canvas.into_image(measure.dpi()),
             map_px: [pane.left, pane.top, size[0], size[1]],
             region_m: Some(Aabb { min: corner_m(voxels.min), max: corner_m(voxels.end) }),
+            max_height_m: self.picture.max_height_m,
             cell_m,
             cell_px: zoom,
             range: self.range.filter(|_| self.collected.content == Content::Values),
@@ -373,6 +376,7 @@ pub(super) fn nothing(picture: &Picture, grid: &Grid, tiles: u64, unread: Vec<Ti
         image: canvas.into_image(measure.dpi()),
         map_px: [0; 4],
         region_m: None,
+        max_height_m: picture.max_height_m,
         cell_m: grid.resolution_m(),
         cell_px: 1,
         range: None,

@@ -19,6 +19,7 @@ pub struct Picture {
     pub(super) color_by: ColorBy,
     pub(super) color_map: &'static ColorMap,
     pub(super) region: Option<Aabb>,
+    pub(super) max_height_m: Option<f64>,
     pub(super) most_px: [usize; 2],
     pub(super) has_grid: bool,
     pub(super) has_legend: bool,
@@ -39,6 +40,7 @@ impl Default for Picture {
             color_by: ColorBy::Height,
             color_map: ColorMap::voxtile(),
             region: None,
+            max_height_m: None,
             most_px: [2048; 2],
             has_grid: true,
             has_legend: true,
@@ -75,6 +77,12 @@ impl Picture {
     /// Draws only voxels whose center is in a box.
     pub fn with_region(self, region: Aabb) -> Self {
         Self { region: Some(region), ..self }
+    }
+
+    /// Draws only voxels whose center is below a height in metres, for example without the ceiling of a room
+    /// ([`Roof`](crate::Roof)).
+    pub fn with_max_height_m(self, max_height_m: Option<f64>) -> Self {
+        Self { max_height_m, ..self }
     }
 
     /// Sets the maximum size of the map in pixels to the right and up, at most 16384; title and legend are added. A
@@ -247,6 +255,9 @@ impl Picture {
         {
             let reason = "needs an azimuth in degrees, and an elevation of 0 to 90 degrees";
             return Err(Error::argument("view", reason));
+        }
+        if self.max_height_m.is_some_and(f64::is_nan) {
+            return Err(Error::argument("max_height", "needs a height in metres"));
         }
         match self.region {
             Some(region) if (0..3).any(|k| region.min[k].is_nan() || region.max[k].is_nan()) => {

@@ -159,6 +159,7 @@ impl Oblique<'_> {
             image: canvas.into_image(measure.dpi()),
             map_px: [corner[0], corner[1], plan.size_px[0], plan.size_px[1]],
             region_m: Some(Aabb { min: corner_m(0), max: corner_m(1) }),
+            max_height_m: picture.max_height_m,
             cell_m: resolution_m,
             cell_px: (plan.zoom().round() as usize).max(1),
             range: values.range,

@@ -1,0 +1,122 @@
+use rayon::prelude::*;
+use std::collections::{BTreeMap, HashMap};
+use voxtile::mapper::MapView;
+use voxtile::space::{Point, TileIndex, VoxelIndex};
+use voxtile::{Error, Result};
+
+/// Columns around a trajectory, and whether something is above them. Pictures of rooms cut the ceiling, which would hide
+/// everything else.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct Roof {
+    /// Columns of half a metre that have free space at the height of the sensor, in tiles along the trajectory.
+    pub columns: u64,
+    /// Columns of these with an occupied voxel above the sensor, up to 20 m.
+    pub roofed: u64,
+    /// Median height of the sensor in metres.
+    pub sensor_m: f64,
+}
+
+/// Maximum number of columns of tiles that are read, evenly along the trajectory.
+const MAX_STACKS: usize = 32;
+/// A roof is at most this far above the sensor.
+const MAX_ABOVE_M: f64 = 20.0;
+/// Width of the columns: sparse points on a ceiling must not leave gaps between them.
+const COLUMN_M: f64 = 0.5;
+/// Share of roofed columns from which on the map is of rooms.
+const ROOM_SHARE: f64 = 0.55;
+
+impl Roof {
+    /// Counts the columns around a trajectory; `None` without a position. Reads up to 32 columns of tiles; unreadable tiles
+    /// are skipped.
+    ///
+    /// # Errors
+    ///
+    /// Fails on errors that do not concern a single tile, such as [`Error::Changed`].
+    pub fn of(map: &dyn MapView, path: &[Point]) -> Result<Option<Self>> {
+        let grid = map.config().grid;
+        let mut visited: BTreeMap<[i32; 2], Vec<f64>> = BTreeMap::new();
+        for (place, voxel) in path.iter().filter_map(|place| Some((place, grid.voxel_of(*place)?))) {
+            let [x, y, _] = grid.tile_of_voxel(voxel).to_array();
+            visited.entry([x, y]).or_default().push(place[2]);
+        }
+        let heights = visited.values().flatten().copied().collect();
+        let Some(sensor_m) = median(heights) else { return Ok(None) };
+        let stacks: Vec<([i32; 2], f64)> =
+            visited.into_iter().filter_map(|(at, heights)| Some((at, median(heights)?))).collect();
+        let every = stacks.len().div_ceil(MAX_STACKS);
+        let stacks: Vec<([i32; 2], f64)> = stacks.into_iter().step_by(every.max(1)).collect();
+        let mut tiles: HashMap<[i32; 2], Vec<TileIndex>> = HashMap::new();
+        for tile in map.tile_indices() {
+            let [x, y, _] = tile.to_array();
+            tiles.entry([x, y]).or_default().push(tile);
+        }
+        let counts = stacks
+            .par_iter()
+            .map(|(at, height_m)| count(map, tiles.get(at).map_or(&[], Vec::as_slice), *height_m));
+        let [columns, roofed] = counts.try_reduce(|| [0; 2], |a, b| Ok([a[0] + b[0], a[1] + b[1]]))?;
+        Ok(Some(Self { columns, roofed, sensor_m }))
+    }
+
+    /// Share of roofed columns, 0 to 1.
+    pub fn share(&self) -> f64 {
+        self.roofed as f64 / self.columns.max(1) as f64
+    }
+
+    /// Returns the height in metres at which pictures of rooms cut the ceiling, that of the sensor; `None` if less than 55 %
+    /// of the columns are roofed. Measured: rooms have 70 to 99 %, streets and campuses 1 to 39 %.
+    pub fn cut_m(&self) -> Option<f64> {
+        (self.columns > 0 && self.share() >= ROOM_SHARE).then_some(self.sensor_m)
+    }
+}
+
+/// Returns the columns of a stack of tiles that are free at a height, and those of them with an occupied voxel above.
+fn count(map: &dyn MapView, tiles: &[TileIndex], height_m: f64) -> Result<[u64; 2]> {
+    let (grid, occupied_from) = (map.config().grid, map.config().occupied_log_odds());
+    let Some([_, _, sensor]) = grid.voxel_of([0.0, 0.0, height_m]) else { return Ok([0; 2]) };
+    let above = (MAX_ABOVE_M / grid.resolution_m()).min(1e9) as i32;
+    let highest = sensor.saturating_add(above);
+    let wide = ((COLUMN_M / grid.resolution_m()).round().min(1e9) as i32).max(1);
+    let edge = grid.voxels_per_tile_edge().div_euclid(wide) + 1;
+    // By column: bit 1 is free at the height of the sensor, bit 2 is occupied above.
+    let mut columns = vec![0_u8; (edge * edge) as usize];
+    for &index in tiles {
+        let voxels = grid.voxels_of_tile(index);
+        if voxels.end[2] <= sensor || voxels.min[2] > highest {
+            continue;
+        }
+        let tile = match map.tile_uncached(index) {
+            Ok(Some(tile)) => tile,
+            Ok(None) | Err(Error::Damaged { .. } | Error::Io { .. }) => continue,
+            Err(error) => return Err(error),
+        };
+        let place = |voxel: VoxelIndex| {
+            let [x, y] = [0, 1].map(|k| voxel[k].wrapping_sub(voxels.min[k]) / wide);
+            (x + y * edge) as usize
+        };
+        if (voxels.min[2]..voxels.end[2]).contains(&sensor) {
+            for x in voxels.min[0]..voxels.end[0] {
+                for y in voxels.min[1]..voxels.end[1] {
+                    let evidence = tile.evidence([x, y, sensor]);
+                    if evidence.is_some_and(|evidence| evidence.log_odds < occupied_from) {
+                        columns[place([x, y, sensor])] |= 1;
+                    }
+                }
+            }
+        }
+        for voxel in tile.voxels_from(occupied_from) {
+            if (sensor + 1..=highest).contains(&voxel.index[2])
+                && let Some(column) = columns.get_mut(place(voxel.index))
+            {
+                *column |= 2;
+            }
+        }
+    }
+    let free = columns.iter().filter(|&&column| column & 1 == 1).count() as u64;
+    Ok([free, columns.iter().filter(|&&column| column == 3).count() as u64])
+}
+
+fn median(mut heights: Vec<f64>) -> Option<f64> {
+    heights.sort_unstable_by(f64::total_cmp);
+    heights.get(heights.len() / 2).copied()
+}
