@@ -141,7 +141,7 @@ def test_a_plot_of_a_room_has_no_ceiling(tmp_path: Path, mode: Any) -> None:
     for name, points in (("room", [floor, ceiling, *walls]), ("open", [floor, *walls])):
         with voxtile.Map.create(tmp_path / name, 0.1) as made:
             made.insert(np.concatenate(points), origin=[0.05, 0.05, 0.05])
-    with voxtile.open(tmp_path / "room", mode) as found:
+    with voxtile.Map.open(tmp_path / "room", mode) as found:
         cut, whole, low = (found.plot(max_height=height) for height in ("auto", None, -1.0))
         with pytest.raises(ValueError, match="max_height: 'high'"):
             found.plot(max_height="high")
@@ -150,7 +150,7 @@ def test_a_plot_of_a_room_has_no_ceiling(tmp_path: Path, mode: Any) -> None:
     assert whole.axes[0].get_title() == low.axes[0].get_title() == ""
     assert np.nanmax(whole.axes[0].images[0].get_array()) > 1.6
     assert np.nanmax(low.axes[0].images[0].get_array()) < -1.0
-    with voxtile.open(tmp_path / "open", mode) as found:
+    with voxtile.Map.open(tmp_path / "open", mode) as found:
         assert found.plot().axes[0].get_title() == ""
 
 
@@ -161,7 +161,7 @@ def test_a_plot_has_the_colors_of_a_map_by_name(room: Path) -> None:
             shown = found.plot(color_map=name).axes[0].images[0].get_cmap()
             wanted = np.divide(last or _voxtile.color_map(name)[-1], 255)
             assert np.allclose(shown(1.0)[:3], wanted, atol=0.005), name
-        with pytest.raises(ValueError, match="'heat' is none of voxtile, viridis"):
+        with pytest.raises(ValueError, match='"heat" is none of voxtile, viridis'):
             found.plot(color_map="heat")
 
 
