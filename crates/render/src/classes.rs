@@ -1,6 +1,7 @@
 //! Names and colors of classes, by the standard of ASPRS for LAS files.
 
-use crate::picture::colors::{Rgb, vivid};
+use crate::colors::Rgb;
+use crate::oklab::vivid;
 
 /// Names and colors of the classes 0 to 18.
 const CLASSES: [(&str, Rgb); 19] = [

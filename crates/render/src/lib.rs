@@ -23,11 +23,16 @@
 //! ```
 
 pub mod classes;
+mod color_map;
 mod layer;
 pub mod levels;
+mod oklab;
 mod picture;
+#[cfg(test)]
+mod sight;
 mod survey;
 
+pub use color_map::ColorMap;
 pub use layer::Layer;
 pub use picture::{
     Change, ColorBy, Drawing, Drawn, Image, OverTime, Panel, Picture, SideAxis, View, colors, is_unix_time,

@@ -38,7 +38,7 @@ pub use view::{Change, ColorBy, SideAxis, View};
 /// Colors of pictures, as red, green and blue in sRGB.
 pub mod colors {
     pub use super::compared::comparison_color;
-    pub(crate) use super::palette::vivid;
+    pub(crate) use super::palette::mixed;
     pub use super::palette::{
         APPEARED, FREE, MOVING, NO_VALUE, NOT_SEEN, PATH, Rgb, SAME, UNCERTAIN, UNCHANGED, UNKNOWN, VANISHED,
         color_of,
