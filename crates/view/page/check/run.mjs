@@ -7,6 +7,7 @@ import { createInterface } from 'node:readline';
 import { inflateSync } from 'node:zlib';
 import { Browser } from './browser.mjs';
 import { checkChanges } from './changes.mjs';
+import { checkExported } from './exported.mjs';
 
 const voxtile = process.env.VOXTILE;
 const work = mkdtempSync(join(tmpdir(), 'voxtile-view-'));
@@ -395,6 +396,8 @@ checks: try {
   await colourBy('height');
   assert.deepEqual(browser.errors, []);
   step(`layers: ${byColour} pixels in colour, ${byClass} by class, ${byIntensity} by intensity, ${byAge} by age; they follow a build and a snapshot`);
+  step(await checkExported({ browser, view, map: layered, run, work, ended }));
+  server = plain;
   const changes = await checkChanges({ browser, view, run, exported, countPixels: count, work });
   server = plain;
   step(`changes between two maps, ${changes}`);

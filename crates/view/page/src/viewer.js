@@ -34,6 +34,8 @@ export class Viewer {
     this.shared = sharedUniforms();
     this.overlays = new Overlays(this.world);
     this.layers = [];
+    // Whether the page is a folder of files, without the server of `voxtile view`.
+    this.isExported = false;
     // In a swipe, layers of side 0 are drawn left of a share of the width, and layers of side 1 right of it.
     this.isSplit = false;
     this.share = 0.5;
