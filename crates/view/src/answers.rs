@@ -18,7 +18,7 @@ use voxtile::space::{Aabb, TileBox, TileIndex, VoxelIndex};
 use voxtile::{Error, Point, Queries, Result};
 use voxtile_pipeline::AnyMap;
 use voxtile_pipeline::answer_at;
-use voxtile_render::Layer;
+use voxtile_render::{ColorMap, Layer};
 
 /// Maximum number of positions in a trajectory.
 pub const TRAJECTORY: usize = 20_000;
@@ -26,7 +26,7 @@ pub const TRAJECTORY: usize = 20_000;
 /// Returns `maps.json`, the list of maps.
 pub fn maps(maps: &[Arc<ServedMap>], comparison: Option<&ServedComparison>) -> Answer {
     let maps: Vec<Value> = maps.iter().enumerate().map(|(number, map)| describe(number, map)).collect();
-    let mut answer = json!({ "maps": maps });
+    let mut answer = json!({ "maps": maps, "color_maps": ColorMap::all() });
     if let Some(comparison) = comparison {
         answer["comparison"] = comparison.describe();
     }

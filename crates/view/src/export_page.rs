@@ -19,10 +19,10 @@ use voxtile::space::{Aabb, TileIndex};
 use voxtile::{Error, Result};
 use voxtile_pipeline::output::StagedOutput;
 use voxtile_pipeline::{AnyMap, Watch, read_any_map, tiles_of};
-use voxtile_render::Layer;
 use voxtile_render::levels::{
     FromLevel, Kind, Levels, LevelsOf, NodeKey, NodeStore, TilesetContent, for_each_subtree, tileset,
 };
+use voxtile_render::{ColorMap, Layer};
 
 /// Maps to write, and how much of them.
 #[derive(Clone, Debug)]
@@ -84,7 +84,10 @@ pub fn export_page(options: &PageOptions, watch: &Watch) -> anyhow::Result<PageS
         nodes += written.nodes;
         unreadable.extend(written.unreadable);
     }
-    folder.write_json("maps.json", json!({ "maps": maps, "exported": { "finest_level": finest } }))?;
+    folder.write_json(
+        "maps.json",
+        json!({ "maps": maps, "color_maps": ColorMap::all(), "exported": { "finest_level": finest } }),
+    )?;
     staged.finish()?;
     let (files, bytes) = (folder.files.into_inner(), folder.bytes.into_inner());
     Ok(PageSummary { output: options.output.clone(), tiles, nodes, files, bytes, unreadable })

@@ -10,6 +10,8 @@ import { Viewer } from './viewer.js';
 export const app = {
   // Maps of `maps.json` that are shown.
   maps: [],
+  // Colour maps of the server.
+  colourMaps: [],
   // Level of the finest voxels in a page that is a folder of files; `null` with a server.
   finest: null,
   // State in the URL.

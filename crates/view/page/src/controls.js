@@ -8,7 +8,7 @@ import { $ } from './dom.js';
 import { isBehind } from './live.js';
 import { allBounds, readCompared, showMaps, surround } from './maps.js';
 import { choose } from './measure.js';
-import { drawLegend, MOVING, OBSTACLE } from './palette.js';
+import { MOVING, OBSTACLE } from './palette.js';
 import { remember } from './view_link.js';
 
 for (const kind of ['occupied', 'free', 'unknown']) {
@@ -97,8 +97,6 @@ viewer.flight.orbit.addEventListener('change', remember);
 viewer.flight.orbit.addEventListener('change', followCamera);
 
 theme(scheme.matches);
-drawLegend($('legend'));
-drawLegend($('distances-legend'));
 $('obstacle-swatch').style.background = `rgb(${OBSTACLE})`;
 $('moving-swatch').style.background = `rgb(${MOVING})`;
 if (matchMedia('(max-width: 700px)').matches) showPanel(false);

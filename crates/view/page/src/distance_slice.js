@@ -42,9 +42,7 @@ export async function loadDistances() {
   try {
     const read = await readDistances(`maps/${id}/distances.bin?at=${around}&cap=${cap}`, request.signal);
     app.distances = { ...read, around };
-    // On top of the voxels of the layer.
-    const low = [...read.corner.slice(0, 2), z + 0.52 * read.edge];
-    viewer.overlays.image('distances', low, read.size, read.edge, coloursOf(read.values));
+    paintDistances();
     $('distances-out').value = read.values.some(Boolean) ? '' : 'unknown here';
   } catch (error) {
     if (request.signal.aborted) return;
@@ -54,6 +52,14 @@ export async function loadDistances() {
     say(`Cannot load the distances: ${error.message}`);
   }
   distancesRequest = null;
+  viewer.wake();
+}
+
+// Draws the distances on top of the voxels of their layer.
+export function paintDistances() {
+  if (!app.distances) return;
+  const { corner, size, edge, values, around } = app.distances;
+  viewer.overlays.image('distances', [...corner.slice(0, 2), around[2] + 0.52 * edge], size, edge, coloursOf(values));
   viewer.wake();
 }
 

@@ -14,7 +14,7 @@ import { readPath } from './trajectory.js';
 
 // Number of the last choice of states to show.
 let shownNumber = 0;
-const COLOURS = [['height', 'height'], ['probability', 'probability'], ['count', 'observations'], ['scan', "tile's last scan"],
+const COLOURS = [['height', 'height'], ['above', 'height above trajectory'], ['probability', 'probability'], ['count', 'observations'], ['scan', 'last scan of the tile'],
   ['rgb', 'colour'], ['intensity', 'intensity'], ['class', 'class'], ['age', 'last hit']];
 
 // The page lists the snapshots of the first map. A map without a snapshot of the chosen name is shown in its current
@@ -72,6 +72,10 @@ function describe() {
 export async function readMaps() {
   const listed = await json('maps.json');
   app.maps = comparison.mapsOf(listed);
+  if (app.colourMaps.length === 0) {
+    app.colourMaps = listed.color_maps;
+    $('ramp').replaceChildren(...app.colourMaps.map(({ name }) => new Option(name, name)));
+  }
   if (listed.exported && app.finest === null) {
     app.finest = listed.exported.finest_level;
     viewer.isExported = true;

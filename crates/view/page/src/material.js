@@ -10,6 +10,8 @@ attribute vec4 paint;
 uniform float threshold;
 uniform vec3 low, high;
 uniform int colourBy;
+uniform highp sampler2D reference;
+uniform vec3 referenceAt;
 uniform vec2 range;
 uniform float lastScan;
 uniform int kind;
@@ -21,6 +23,18 @@ varying float light;
 varying float change;
 varying vec3 classColour;
 varying vec4 layerColour;
+// Height of the trajectory or ground, between the centers of cells.
+float referenceOf(vec2 at) {
+  vec2 cell = (at - referenceAt.xy) / referenceAt.z - 0.5;
+  ivec2 last = textureSize(reference, 0) - 1;
+  ivec2 low = clamp(ivec2(floor(cell)), ivec2(0), last);
+  ivec2 high = min(low + 1, last);
+  vec2 along = clamp(cell - vec2(low), 0.0, 1.0);
+  vec2 below = vec2(texelFetch(reference, low, 0).r, texelFetch(reference, ivec2(high.x, low.y), 0).r);
+  vec2 beyond = vec2(texelFetch(reference, ivec2(low.x, high.y), 0).r, texelFetch(reference, high, 0).r);
+  vec2 rows = mix(below, beyond, along.y);
+  return mix(rows.x, rows.y, along.x);
+}
 void main() {
   int side = int(place.w + 0.5);
   bool isSeen = kind != 0 || (levels.x >= threshold && (levels.y < 0.5 || levels.y - 1.0 < threshold));
@@ -47,7 +61,8 @@ void main() {
   corner = uv;
   change = levels.x;
   layerColour = paint;
-  float value = colourBy <= 0 ? mid.z : colourBy == 1 ? levels.x : colourBy == 2 ? levels.z : lastScan;
+  float value = colourBy <= 0 ? mid.z : colourBy == 1 ? levels.x : colourBy == 2 ? levels.z
+    : colourBy == 3 ? lastScan : mid.z - referenceOf(mid.xy);
   share = clamp((value - range.x) / max(range.y - range.x, 1e-6), 0.0, 1.0);
   gl_Position = projectionMatrix * modelViewMatrix * vec4(place.xyz + at, 1.0);
 }`;
@@ -162,6 +177,9 @@ export const sharedUniforms = () => ({
   low: { value: new THREE.Vector3(-Infinity, -Infinity, -Infinity) },
   high: { value: new THREE.Vector3(Infinity, Infinity, Infinity) },
   colourBy: { value: 0 },
+  // Heights of the trajectory or ground; lower corner along x and y, and edge of a cell.
+  reference: { value: null },
+  referenceAt: { value: new THREE.Vector3(0, 0, 1) },
   // Range of the colours of intensities and times.
   paintRange: { value: [0, 1] },
   // Classes of a comparison that are shown, as bits.

@@ -1,6 +1,7 @@
 // The view in the URL.
 
 import { app, comparison, swipe, viewer } from './app.js';
+import { chooseRamp } from './colours.js';
 import { cut, CUTS, OPEN } from './cut.js';
 import { $, chooseOption } from './dom.js';
 import { readLink, writeLink } from './link.js';
@@ -12,6 +13,7 @@ export function remember() {
     eye: viewer.toMap(viewer.camera.position.toArray()),
     to: viewer.toMap(viewer.flight.orbit.target.toArray()),
     colour: $('colour').value === 'height' ? null : $('colour').value,
+    ramp: $('ramp').selectedIndex > 0 ? $('ramp').value : null,
     threshold: viewer.threshold || null,
     at: $('snapshot').value,
     since: $('since').value,
@@ -25,6 +27,7 @@ export function remember() {
 // Sets the controls from a link; unknown colours, snapshots and numbers are ignored.
 export function applyLink() {
   chooseOption('colour', app.link.colour);
+  chooseRamp(app.link.ramp);
   chooseOption('snapshot', app.link.at ?? '');
   chooseOption('since', app.link.since ?? '');
   $('swiped').checked = app.link.line !== null;

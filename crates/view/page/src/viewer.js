@@ -213,9 +213,18 @@ export class Viewer {
     else setTimeout(again, 30);
   }
 
+  // Sets the heights above which colours show heights.
+  refer(reference) {
+    this.shared.reference.value?.dispose();
+    this.shared.reference.value = reference.texture(this.middle[2]);
+    const [x, y] = this.toScene([...reference.low, 0]);
+    this.shared.referenceAt.value.set(x, y, reference.cell);
+    this.wake();
+  }
+
   // Sets the uniforms from the controls.
   paint() {
-    this.shared.colourBy.value = ['height', 'probability', 'count', 'scan'].indexOf(this.colour);
+    this.shared.colourBy.value = ['height', 'probability', 'count', 'scan', 'above'].indexOf(this.colour);
     this.shared.paintRange.value = this.range;
     this.shared.classes.value = this.classes;
     this.shared.low.value.set(...this.toScene(this.cut.low));
@@ -224,7 +233,7 @@ export class Viewer {
       const uniforms = layer.material.uniforms;
       uniforms.threshold.value = this.threshold;
       // Voxels whose values are not loaded yet are coloured by height.
-      const isHeight = !['probability', 'count', 'scan'].includes(this.colour);
+      const isHeight = !['probability', 'count', 'scan', 'above'].includes(this.colour);
       uniforms.range.value.set(...(isHeight ? this.heights.map((k) => k + this.world.position.z) : this.range));
       uniforms.layer.value = BY_LAYER[this.colour] ?? null;
     }
