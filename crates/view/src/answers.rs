@@ -18,7 +18,7 @@ use voxtile::space::{Aabb, TileBox, TileIndex, VoxelIndex};
 use voxtile::{Error, Point, Queries, Result};
 use voxtile_pipeline::AnyMap;
 use voxtile_pipeline::answer_at;
-use voxtile_render::{ColorMap, Layer};
+use voxtile_render::{ColorMap, Layer, is_unix_time};
 
 /// Maximum number of positions in a trajectory.
 pub const TRAJECTORY: usize = 20_000;
@@ -200,6 +200,7 @@ pub fn trajectory(map: &AnyMap, most: usize, within: Option<&Aabb>) -> Result<Va
     let mut answer = json!({ "scans": scans.len(), "points": points });
     let times_s: Option<Vec<f64>> = some.iter().map(|scan| Some(scan.stamp_ns? as f64 * 1e-9)).collect();
     if let Some(times_s) = times_s.filter(|times_s| !times_s.is_empty()) {
+        answer["is_unix_time"] = times_s.iter().copied().all(is_unix_time).into();
         answer["times_s"] = times_s.into();
     }
     Ok(answer)

@@ -9,6 +9,7 @@ import { Browser } from './browser.mjs';
 import { checkChanges } from './changes.mjs';
 import { checkColours } from './colours.mjs';
 import { checkExported } from './exported.mjs';
+import { checkOpacity, checkTools } from './tools.mjs';
 
 const voxtile = process.env.VOXTILE;
 const work = mkdtempSync(join(tmpdir(), 'voxtile-view-'));
@@ -147,7 +148,7 @@ async function checkHands(map) {
   const cropped = exported(join(work, 'cropped')).size;
   assert.ok(cropped > 0 && cropped < exported(map).size);
   await browser.until(`document.getElementById('state').textContent === 'ready' && voxtile.voxels().count === ${cropped}`, 30);
-  await browser.value('document.getElementById("uncut").click(); document.getElementById("play").click()');
+  await browser.value('document.getElementById("uncut").click(); document.getElementById("speed").value = 10; document.getElementById("play").click()');
   await browser.until('document.getElementById("play").ariaPressed === "false" && document.getElementById("scan").value === document.getElementById("scan").max', 20);
   await browser.ready();
   assert.equal(await browser.value('document.querySelectorAll("#panel > details:not([hidden])").length'), 5);
@@ -160,6 +161,18 @@ const step = (text) => console.log(`${++done}. ${text}`);
 checks: try {
   if (process.env.ONLY === 'changes') {
     step(await checkChanges({ browser, view, run, exported, countPixels: count, work }));
+    break checks;
+  }
+  if (process.env.ONLY === 'tools') {
+    const map = join(work, 'room');
+    run('build', scan(0), '-o', map, '--resolution', '0.1', '-q');
+    run('build', scan(7), '-o', map, '--append', '-q');
+    step(await checkTools({ browser, view, map, run, exported, work }));
+    run('build', scan(1), '-o', join(work, 'other'), '--resolution', '0.1', '-q');
+    await browser.open('about:blank');
+    await browser.open(await view(map, join(work, 'other')));
+    await browser.ready();
+    step(await checkOpacity({ browser, countPixels: count }));
     break checks;
   }
   const map = join(work, 'room');
@@ -420,6 +433,12 @@ checks: try {
   assert.deepEqual(browser.errors, []);
 
   step(await checkHands(map));
+  const running = server;
+  step(await checkTools({ browser, view, map, run, exported, work }));
+  server = running;
+  await browser.open('about:blank');
+  await browser.open(url);
+  await browser.ready();
 
   const atRest = await browser.value('voxtile.drawCalls()');
   await browser.value('voxtile.lookAt(...Object.values(voxtile.camera()))');
@@ -486,6 +505,7 @@ checks: try {
   })));
   await follows(map, other);
   assert.deepEqual(browser.errors, []);
+  step(await checkOpacity({ browser, countPixels: count }));
   step('a map without the snapshot shows its current state, a deleted snapshot is left, and all maps are updated');
 
   if (process.argv[2]) {

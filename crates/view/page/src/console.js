@@ -4,6 +4,7 @@ import { $ } from './dom.js';
 import { BY_LAYER } from './layers.js';
 import { centerOf } from './pick.js';
 import { clickAt } from './query.js';
+import { sectionShown } from './section.js';
 
 // For tests and the console.
 window.voxtile = {
@@ -36,6 +37,7 @@ window.voxtile = {
     const { offsets, origin } = app.moving;
     return Array.from({ length: app.moving.count }, (_, k) => origin.map((at, axis) => at + offsets[3 * k + axis]));
   },
+  section: sectionShown,
   distances: () => app.distances && { ...app.distances, values: [...app.distances.values] },
   clickAt,
   draw: () => viewer.draw(),

@@ -7,7 +7,7 @@ import { followCamera } from './distance_slice.js';
 import { $ } from './dom.js';
 import { isBehind } from './live.js';
 import { allBounds, readCompared, showMaps, surround } from './maps.js';
-import { choose } from './measure.js';
+import { choose, removeMark } from './measure.js';
 import { MOVING, OBSTACLE } from './palette.js';
 import { remember } from './view_link.js';
 
@@ -73,11 +73,17 @@ $('theme').addEventListener('click', () => theme(!document.documentElement.class
 const keys = {
   KeyF: () => $('fit').click(), KeyT: () => $('top').click(), KeyL: () => $('side').click(), KeyG: () => $('walk').click(),
   KeyN: () => comparison.step(1), KeyB: () => comparison.step(-1), KeyP: () => showPanel($('panel').hidden), KeyM: () => choose('measure'), KeyV: () => choose('sight'), Escape: () => choose('query'),
-  Slash: () => $('help').click(), KeyZ: () => $('back').click(), KeyK: () => $('play').click(),
+  Backspace: removeMark, KeyX: () => choose('section'), KeyZ: () => $('back').click(), KeyK: () => $('play').click(),
 };
 window.addEventListener('keydown', (event) => {
   if (event.ctrlKey || event.metaKey || event.altKey || $('keys').open || event.target.matches?.('select')) return;
-  const digit = /^Digit([1-8])$/.exec(event.code);
+  // The question mark is on other keys of other keyboards.
+  if (event.key === '?') {
+    $('help').click();
+    return;
+  }
+  if (event.target.matches?.('input[type=number]')) return;
+  const digit = /^Digit([1-9])$/.exec(event.code);
   if (digit && $('colour').options[digit[1] - 1]) {
     $('colour').selectedIndex = Number(digit[1]) - 1;
     colour();

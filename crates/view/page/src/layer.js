@@ -37,6 +37,7 @@ export class Layer {
     this.tiles = this.open();
     this.next = null;
     this.isShown = true;
+    this.opacity = 1;
   }
 
   open() {

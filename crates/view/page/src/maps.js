@@ -50,7 +50,13 @@ function describe() {
       viewer.layers[k].isShown = box.checked;
       viewer.wake();
     });
-    label.append(box, ' ', swatchOf(LAYERS[k % LAYERS.length]), one.name);
+    const opacity = Object.assign(document.createElement('input'), { type: 'range', min: 0, max: 1, step: 0.05, value: viewer.layers[k]?.opacity ?? 1 });
+    opacity.setAttribute('aria-label', `Opacity of ${one.name}`);
+    opacity.addEventListener('input', () => {
+      viewer.layers[k].opacity = Number(opacity.value);
+      viewer.wake();
+    });
+    label.append(box, swatchOf(LAYERS[k % LAYERS.length]), one.name, opacity);
     return label;
   }));
   for (const [id, first] of [['snapshot', 'current'], ['since', 'none']]) {
@@ -155,7 +161,11 @@ export async function showMaps() {
   viewer.scaled = false;
   swipe.show(shown);
   viewer.show(shown, app.legend);
-  viewer.layers.forEach((layer, k) => { layer.isShown = $('layers').querySelectorAll('input')[k]?.checked ?? true; });
+  viewer.layers.forEach((layer, k) => {
+    const row = $('layers').children[k];
+    layer.isShown = row?.querySelector('[type=checkbox]').checked ?? true;
+    layer.opacity = Number(row?.querySelector('[type=range]').value ?? 1);
+  });
   paint();
   if (!app.legend) loadLegend();
   readPath();

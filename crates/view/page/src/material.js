@@ -69,6 +69,7 @@ void main() {
 
 const fragment = /* glsl */ `
 uniform sampler2D ramp;
+uniform vec2 opacity;
 uniform vec4 tint;
 uniform vec3 changes[3];
 uniform int kind;
@@ -82,7 +83,14 @@ varying float change;
 varying vec3 classColour;
 varying vec4 layerColour;
 vec3 linearOf(vec3 c) { return mix(c / 12.92, pow((c + 0.055) / 1.055, vec3(2.4)), step(0.04045, c)); }
+// Thresholds of 4 x 4 pixels, in an order in which neighbours differ most.
+float thresholdOf(ivec2 at) {
+  ivec2 low = at & 1, high = at >> 1 & 1;
+  return (float(4 * ((low.x ^ low.y) * 2 + low.y) + (high.x ^ high.y) * 2 + high.y) + 0.5) / 16.0;
+}
 void main() {
+  // A map of partial opacity leaves out pixels, other ones than the other maps do: no order of drawing is needed.
+  if (opacity.x < 1.0 && thresholdOf(ivec2(gl_FragCoord.xy) + ivec2(opacity.y) * ivec2(1, 2)) >= opacity.x) discard;
   vec3 colour = texture2D(ramp, vec2(share * 255.0 / 256.0 + 0.5 / 256.0, 0.5)).rgb;
   if (kind == 3) colour = change < 1.5 ? changes[0] : change < 2.5 ? changes[1] : changes[2];
   else if (kind == 4) colour = classColour;
@@ -122,6 +130,8 @@ export function makeMaterial(kind, shared) {
       classColours: { value: CLASSES.map(linear) },
       tint: { value: own ? new THREE.Vector4(own.r, own.g, own.b, 1) : new THREE.Vector4(0, 0, 0, 0) },
       threshold: { value: 0 },
+      // Opacity, and the number of the map.
+      opacity: { value: new THREE.Vector2(1, 0) },
       range: { value: new THREE.Vector2(0, 1) },
       lastScan: { value: 0 },
       // Name of the layer that is shown, and whether the drawn node has its colours (1) or its numbers (2).

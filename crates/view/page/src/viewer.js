@@ -9,9 +9,9 @@ import { OF_FIRST_MAP, Overlays } from './overlays.js';
 import { Shading } from './shading.js';
 
 const MOST_CALLS = 200;
-// Draw calls reserved for overlays: trajectory, sensor, moving points, distances, marks, change, ground, grid, bounding box;
+// Draw calls reserved for overlays: trajectory, sensor, moving points, distances, marks, change, ground, grid, bounding box, section, cut box;
 // and for the shading.
-const OVERLAY_CALLS = 14;
+const OVERLAY_CALLS = 16;
 
 // Scene with layers, overlays and camera. Draws only after changes.
 export class Viewer {
@@ -229,8 +229,9 @@ export class Viewer {
     this.shared.classes.value = this.classes;
     this.shared.low.value.set(...this.toScene(this.cut.low));
     this.shared.high.value.set(...this.toScene(this.cut.high));
-    for (const layer of this.layers) {
+    for (const [k, layer] of this.layers.entries()) {
       const uniforms = layer.material.uniforms;
+      uniforms.opacity.value.set(layer.opacity, k);
       uniforms.threshold.value = this.threshold;
       // Voxels whose values are not loaded yet are coloured by height.
       const isHeight = !['probability', 'count', 'scan', 'above'].includes(this.colour);
