@@ -1,14 +1,22 @@
 use crate::args::ViewArgs;
 use crate::json;
-use crate::progress::Progress;
+use crate::part::region_of;
+use crate::progress::{Progress, at_terminal};
+use crate::quiet::summary_out;
+use crate::stop_signal;
+use indicatif::{HumanBytes, HumanCount};
 use parking_lot::Mutex;
 use std::io::{IsTerminal, Write};
+use std::path::Path;
 use std::process::ExitCode;
 use std::sync::Arc;
 use voxtile_compare::CompareOptions;
-use voxtile_view::{CompareWith, View, ViewOptions};
+use voxtile_view::{CompareWith, PageOptions, View, ViewOptions, export_page};
 
 pub fn run(args: &ViewArgs) -> anyhow::Result<ExitCode> {
+    if let Some(folder) = &args.export_page {
+        return export(args, folder);
+    }
     let mut options = CompareOptions::default().with_tolerance(args.tolerance);
     options = args.min_voxels.map_or(options.clone(), |voxels| options.with_min_voxels(voxels));
     options = args.certainty.map_or(options.clone(), |certainty| options.with_certainty(certainty));
@@ -33,6 +41,38 @@ pub fn run(args: &ViewArgs) -> anyhow::Result<ExitCode> {
         }
     }
     view.serve()?;
+    Ok(ExitCode::SUCCESS)
+}
+
+/// Writes the page for static web servers.
+fn export(args: &ViewArgs, folder: &Path) -> anyhow::Result<ExitCode> {
+    let watch = at_terminal(stop_signal::catch_unfinished()?);
+    let options = PageOptions {
+        maps: args.maps.clone(),
+        output: folder.to_owned(),
+        finest: args.finest,
+        region: args.region.as_deref().map(region_of).transpose()?,
+        keeps_levels: !args.no_cache,
+    };
+    let summary = export_page(&options, &watch)?;
+    for reason in &summary.unreadable {
+        log::warn!("left out: {reason}");
+    }
+    let mut out = summary_out(args.json);
+    if args.json {
+        json::print(&serde_json::to_value(summary)?, &mut out)?;
+        return Ok(ExitCode::SUCCESS);
+    }
+    writeln!(out, "page      {}", summary.output.display())?;
+    writeln!(
+        out,
+        "content   {} tiles, {} nodes in {} files, {}",
+        HumanCount(summary.tiles),
+        HumanCount(summary.nodes),
+        HumanCount(summary.files),
+        HumanBytes(summary.bytes)
+    )?;
+    writeln!(out, "to serve  python3 -m http.server -d {}", summary.output.display())?;
     Ok(ExitCode::SUCCESS)
 }
 

@@ -74,6 +74,7 @@ pub use map_at::{
 pub use moving_points::read_moving_points;
 pub use new_poses::{PoseFile, WhichScans, poses_for};
 pub use polygon_file::PolygonFile;
+pub use region_tiles::tiles_of;
 pub use scan_digest::scan_digest;
 pub use scan_input::{ScanInput, ScanInputs, is_standard_input, open_paths};
 pub use scan_place::LocalScans;

@@ -14,7 +14,7 @@ cp -r src "$work/src"
 (cd "$work" && npm ci --silent --no-audit --no-fund --ignore-scripts >/dev/null)
 out=$work/dist
 mkdir "$out"
-(cd "$work" && node node_modules/esbuild-wasm/bin/esbuild src/main.js --bundle --minify --format=esm --target=es2022 \
+(cd "$work" && node node_modules/esbuild-wasm/bin/esbuild src/main.js --bundle --minify --format=iife --target=es2022 \
     --legal-comments=none --log-level=warning --outfile=dist/page.js)
 (cd "$work" && node node_modules/esbuild-wasm/bin/esbuild src/page.css --minify --log-level=warning --outfile=dist/page.css)
 cp src/index.html "$out/index.html"

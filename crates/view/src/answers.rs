@@ -9,23 +9,24 @@ use super::route::{At, MapId, Thing};
 use super::served_map::{Found, Makes, ServedMap};
 use hyper::StatusCode;
 use serde_json::{Value, json};
+use std::path::Path;
 use std::sync::Arc;
 use voxtile::mapper::MapView;
 use voxtile::query::UnknownAs;
 use voxtile::scan::Stop;
-use voxtile::space::{Aabb, VoxelIndex};
+use voxtile::space::{Aabb, TileBox, TileIndex, VoxelIndex};
 use voxtile::{Error, Point, Queries, Result};
 use voxtile_pipeline::AnyMap;
 use voxtile_pipeline::answer_at;
-use voxtile_render::Layer;
+use voxtile_render::{ColorMap, Layer, is_unix_time};
 
 /// Maximum number of positions in a trajectory.
-const TRAJECTORY: usize = 20_000;
+pub const TRAJECTORY: usize = 20_000;
 
 /// Returns `maps.json`, the list of maps.
 pub fn maps(maps: &[Arc<ServedMap>], comparison: Option<&ServedComparison>) -> Answer {
     let maps: Vec<Value> = maps.iter().enumerate().map(|(number, map)| describe(number, map)).collect();
-    let mut answer = json!({ "maps": maps });
+    let mut answer = json!({ "maps": maps, "color_maps": ColorMap::all() });
     if let Some(comparison) = comparison {
         answer["comparison"] = comparison.describe();
     }
@@ -34,37 +35,51 @@ pub fn maps(maps: &[Arc<ServedMap>], comparison: Option<&ServedComparison>) -> A
 
 fn describe(number: usize, map: &ServedMap) -> Value {
     let state = map.now();
-    let grid = state.map.config().grid;
-    let edge_m = grid.tile_size_m();
-    let bounds = state.map.tile_bounds().map(|tiles| {
-        let corner = |tile: [i32; 3], more: i64| tile.map(|k| (i64::from(k) + more) as f64 * edge_m);
-        json!({ "min": corner(tiles.min().to_array(), 0), "max": corner(tiles.max().to_array(), 1) })
-    });
     let listed = map.snapshots();
     let snapshots = listed.iter().map(|listed| json!({ "name": listed.name, "tiles": listed.tiles }));
-    let layers = state.map.config().layers();
+    let mut described = described(number, map.name(), &state.map, &state.map.tile_indices());
+    described["generation"] = state.generation.into();
+    described["pending_tiles"] = state.pending_tiles.into();
+    described["unreadable"] = state.levels.unreadable().into();
+    described["snapshots"] = snapshots.collect();
+    described
+}
+
+/// Returns the name of a map in the page.
+pub fn name_of(map: &Path) -> String {
+    map.file_name().unwrap_or(map.as_os_str()).to_string_lossy().into_owned()
+}
+
+/// Returns what `maps.json` has of a map that never changes, or of some tiles of one.
+pub fn described(number: usize, name: &str, map: &AnyMap, tiles: &[TileIndex]) -> Value {
+    let config = map.config();
+    let edge_m = config.grid.tile_size_m();
+    let bounds = TileBox::of(tiles.iter().copied()).map(|tiles| extent_m(tiles, edge_m));
+    let layers = config.layers();
     let layers: Vec<_> =
         Layer::ALL.into_iter().filter(|layer| layer.is_in(&layers)).map(Layer::name).collect();
     let mut described = json!({
         "id": number.to_string(),
-        "name": map.name(),
-        "resolution_m": grid.resolution_m(),
+        "name": name,
+        "resolution_m": config.grid.resolution_m(),
         "tile_size_m": edge_m,
-        "tiles": state.map.tile_indices().len(),
-        "generation": state.generation,
+        "tiles": tiles.len(),
         "bounds": bounds,
-        "scans": state.map.scan_number(),
-        "snapshots": snapshots.collect::<Vec<_>>(),
-        "pending_tiles": state.pending_tiles,
-        "unreadable": state.levels.unreadable(),
+        "scans": map.scan_number(),
     });
-    if let Some(crs) = &state.map.config().crs {
+    if let Some(crs) = &config.crs {
         described["crs"] = crs.as_str().into();
     }
     if !layers.is_empty() {
         described["layers"] = layers.into();
     }
     described
+}
+
+/// Returns the box of some tiles in metres.
+pub fn extent_m(tiles: TileBox, edge_m: f64) -> Aabb {
+    let corner = |tile: [i32; 3], more: i64| tile.map(|k| (i64::from(k) + more) as f64 * edge_m);
+    Aabb { min: corner(tiles.min().to_array(), 0), max: corner(tiles.max().to_array(), 1) }
 }
 
 /// Responds to a request for a map; `stop` ends the work early. Returns `None` if it needs levels that are not built yet and may not be built here.
@@ -155,10 +170,7 @@ fn query_result(map: &AnyMap, thing: &Thing, version: Option<u64>, stop: &Stop) 
     let answer = match thing {
         Thing::Query(point) => query(map, *point)?,
         Thing::Raycast(from, to) => raycast(map, *from, *to)?,
-        Thing::Trajectory => {
-            let (scans, points) = trajectory(map, TRAJECTORY)?;
-            json!({ "scans": scans, "points": points })
-        }
+        Thing::Trajectory => trajectory(map, TRAJECTORY, None)?,
         Thing::Moving => return Ok(Some(Answer::bytes(moving(map, version)?, Keep::No))),
         Thing::Distances(around, cap_m) => {
             let bytes = distance_slice(map, *around, *cap_m, stop)?;
@@ -174,14 +186,24 @@ fn query_result(map: &AnyMap, thing: &Thing, version: Option<u64>, stop: &Stop) 
     Ok(Some(Answer::json(answer)))
 }
 
-/// Returns the number of scans and at most `most` positions of the sensor.
-fn trajectory(map: &AnyMap, most: usize) -> Result<(u64, Vec<Point>)> {
-    let AnyMap::Map(map) = map else { return Ok((0, Vec::new())) };
-    let scans = map.scans()?;
+/// Returns the number of scans, and positions and times of at most `most`, if wanted only those in a box.
+pub fn trajectory(map: &AnyMap, most: usize, within: Option<&Aabb>) -> Result<Value> {
+    let mut scans = match map {
+        AnyMap::Map(map) => map.scans()?,
+        AnyMap::Octree(_) => Vec::new(),
+    };
+    scans.retain(|scan| within.is_none_or(|within| within.contains(scan.origin_m)));
     let step = scans.len().div_ceil(most).max(1);
     let last = scans.last().filter(|_| scans.len() % step != 1 && step > 1);
-    let points = scans.iter().step_by(step).chain(last).map(|scan| scan.origin_m).collect();
-    Ok((scans.len() as u64, points))
+    let some: Vec<_> = scans.iter().step_by(step).chain(last).collect();
+    let points: Vec<Point> = some.iter().map(|scan| scan.origin_m).collect();
+    let mut answer = json!({ "scans": scans.len(), "points": points });
+    let times_s: Option<Vec<f64>> = some.iter().map(|scan| Some(scan.stamp_ns? as f64 * 1e-9)).collect();
+    if let Some(times_s) = times_s.filter(|times_s| !times_s.is_empty()) {
+        answer["is_unix_time"] = times_s.iter().copied().all(is_unix_time).into();
+        answer["times_s"] = times_s.into();
+    }
+    Ok(answer)
 }
 
 /// Returns the result of `voxtile query --json`, with the indices of voxel and tile.

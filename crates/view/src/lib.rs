@@ -12,6 +12,7 @@
 //!            ServedMap one map that another process may write       served_map
 //!            comparison  classes of the voxels of two maps      comparison
 //!            MapState  one state of it: a flush or a snapshot       map_state, node_cache
+//! export_page   a folder with the page, for static web servers
 //! ```
 //!
 //! The page is `page/dist`, built by `page/bundle.sh`. docs/view.md describes the HTTP interface.
@@ -22,6 +23,7 @@ mod client_stream;
 mod comparison;
 mod connections;
 mod distance_slice;
+mod export_page;
 mod map_state;
 mod moving;
 mod node_cache;
@@ -35,4 +37,5 @@ mod view;
 mod view_metrics;
 mod work;
 
+pub use export_page::{PageOptions, PageSummary, export_page};
 pub use view::{CompareWith, Progress, View, ViewOptions};

@@ -101,36 +101,38 @@ fn difference<'a>(before: &'a MapState, after: &'a MapState) -> Result<Differenc
 }
 
 impl MapState {
-    /// Returns `layers.json`: what legends show of the layers of all occupied voxels.
+    /// Returns `layers.json`.
     pub fn layer_legends(&self) -> Result<serde_json::Value> {
-        let totals = self.levels.layer_totals(&self.map, &self.store)?;
-        let layers = self.map.config().layers();
-        let mut legends = serde_json::Map::new();
-        if layers.colour {
-            legends.insert("colour".into(), json!({}));
-        }
-        if layers.intensity_max.is_some() {
-            legends.insert("intensity".into(), json!({ "range": totals.intensity_range(&layers) }));
-        }
-        if layers.class {
-            let class = |(class, voxels)| {
-                let (name, color) = (class_name(class), class_color(class));
-                json!({ "class": class, "name": name, "color": color, "voxels": voxels })
-            };
-            legends.insert(
-                "class".into(),
-                json!({ "classes": totals.classes().map(class).collect::<Vec<_>>() }),
-            );
-        }
-        if layers.time {
-            let range_s = totals.time().map(|time| [time.first_ns, time.last_ns].map(|ns| ns as f64 * 1e-9));
-            let is_unix = range_s.is_some_and(|range| range.into_iter().all(is_unix_time));
-            legends.insert("time".into(), json!({ "range_s": range_s, "is_unix_time": is_unix }));
-        }
-        Ok(legends.into())
+        layer_legends(&self.levels, &self.map, &self.store)
     }
 
     pub fn nodes(&self) -> LevelsOf<'_, AnyMap> {
         LevelsOf { levels: &self.levels, map: &self.map }
     }
+}
+
+/// Returns `layers.json`: what legends show of the layers of all occupied voxels.
+pub fn layer_legends(levels: &Levels, map: &AnyMap, store: &NodeStore) -> Result<serde_json::Value> {
+    let totals = levels.layer_totals(map, store)?;
+    let layers = map.config().layers();
+    let mut legends = serde_json::Map::new();
+    if layers.colour {
+        legends.insert("colour".into(), json!({}));
+    }
+    if layers.intensity_max.is_some() {
+        legends.insert("intensity".into(), json!({ "range": totals.intensity_range(&layers) }));
+    }
+    if layers.class {
+        let class = |(class, voxels)| {
+            let (name, color) = (class_name(class), class_color(class));
+            json!({ "class": class, "name": name, "color": color, "voxels": voxels })
+        };
+        legends.insert("class".into(), json!({ "classes": totals.classes().map(class).collect::<Vec<_>>() }));
+    }
+    if layers.time {
+        let range_s = totals.time().map(|time| [time.first_ns, time.last_ns].map(|ns| ns as f64 * 1e-9));
+        let is_unix = range_s.is_some_and(|range| range.into_iter().all(is_unix_time));
+        legends.insert("time".into(), json!({ "range_s": range_s, "is_unix_time": is_unix }));
+    }
+    Ok(legends.into())
 }

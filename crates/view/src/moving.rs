@@ -2,6 +2,7 @@
 
 use super::response::gzip;
 use voxtile::mapper::MapReader;
+use voxtile::space::Aabb;
 use voxtile::store::{KeptFrame, KeptRecord};
 use voxtile::{Point, Result};
 use voxtile_pipeline::{AnyMap, read_moving_points};
@@ -37,27 +38,35 @@ struct Thinned {
 
 /// Returns the marked points, compressed with gzip; without points if `known` is the version of the marks.
 pub fn moving(map: &AnyMap, known: Option<u64>) -> Result<Vec<u8>> {
+    moving_within(map, known, None)
+}
+
+/// As [`moving`], for the points in a box.
+pub fn moving_within(map: &AnyMap, known: Option<u64>, within: Option<&Aabb>) -> Result<Vec<u8>> {
     let (mut marks, mut thinned) = (Marks::none(), Thinned::new());
     if let AnyMap::Map(map) = map
         && map.keeps_scans()
     {
         marks = Marks::of(map)?;
         if known != Some(marks.version) {
-            thinned = read(map, marks.points_to_read, MAX_POINTS_READ)?;
+            thinned = read(map, marks.points_to_read, MAX_POINTS_READ, within)?;
         }
     }
     Ok(gzip(&bytes_of(&marks, &thinned)))
 }
 
 /// Reads the marked points; if the scans that have some have more than `max_points` points, only of every n-th of them.
-fn read(map: &MapReader, points: u64, max_points: u64) -> Result<Thinned> {
+fn read(map: &MapReader, points: u64, max_points: u64, within: Option<&Aabb>) -> Result<Thinned> {
     let (every, mut number) = (points.div_ceil(max_points).max(1), 0);
     let is_wanted = |_: &KeptRecord| {
         number += 1;
         (number - 1) % every == 0
     };
     let mut thinned = Thinned::new();
-    read_moving_points(map, is_wanted, |points| points.iter().for_each(|&point| thinned.offer(point)))?;
+    let is_within = |point: &&Point| within.is_none_or(|within| within.contains(**point));
+    read_moving_points(map, is_wanted, |points| {
+        points.iter().filter(is_within).for_each(|&point| thinned.offer(point));
+    })?;
     Ok(thinned)
 }
 
@@ -160,11 +169,11 @@ mod tests {
         let marks = Marks::of(&map).unwrap();
         assert_eq!((marks.points, marks.points_to_read), (15, 50));
         assert_ne!(marks.version, before.version);
-        let all = read(&map, marks.points_to_read, 50).unwrap();
+        let all = read(&map, marks.points_to_read, 50, None).unwrap();
         let rows = |thinned: &Thinned| thinned.points.iter().map(|[_, y, _]| *y).collect::<Vec<f32>>();
         assert_eq!(rows(&all), [0.0, 2.0, 4.0, 6.0, 8.0].map(|y| [y; 3]).concat());
         assert_eq!(all.origin_m, [5.0, 0.0, 7.0]);
-        let half = read(&map, marks.points_to_read, 49).unwrap();
+        let half = read(&map, marks.points_to_read, 49, None).unwrap();
         assert_eq!(rows(&half), [0.0, 4.0, 8.0].map(|y| [y; 3]).concat());
     }
 

@@ -29,3 +29,8 @@ static PAGE: LazyLock<Vec<PageFile>> = LazyLock::new(|| {
 pub fn file(name: &str) -> Option<&'static PageFile> {
     PAGE.iter().find(|file| file.name == name)
 }
+
+/// Returns all files of the page.
+pub fn files() -> &'static [PageFile] {
+    &PAGE
+}

@@ -1,3 +1,4 @@
+use super::answers::name_of;
 use super::map_state::{MapState, QueryMap, Shown};
 use super::node_cache;
 use super::route::{At, MapId};
@@ -96,11 +97,10 @@ impl ServedMap {
         let levels = levels.context("the levels of a map without tiles")?;
         let pending_tiles = map.tile_indices().len() as u64;
         let now = MapState { map, levels, store: store.clone(), generation: 0, pending_tiles };
-        let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned();
         Ok(Self {
             path: path.to_owned(),
             at: MapAt::of(path)?,
-            name,
+            name: name_of(path),
             store,
             now: RwLock::new(Arc::new(now)),
             listed: Mutex::default(),

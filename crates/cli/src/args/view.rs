@@ -3,6 +3,7 @@ use std::net::SocketAddr;
 use std::path::PathBuf;
 
 #[derive(Debug, Args)]
+#[command(allow_negative_numbers = true)]
 pub struct ViewArgs {
     /// Folders of maps, FOLDER@SNAPSHOT, or OctoMap files (.bt .ot); each map is a layer
     #[arg(required = true, value_name = "MAP")]
@@ -34,7 +35,18 @@ pub struct ViewArgs {
     /// Do not store coarse levels of the map in the user's cache folder for the next time
     #[arg(long)]
     pub no_cache: bool,
-    /// Print the URL as JSON
+    /// Write the page into this folder instead, with all that it shows as files: any static web server can serve it,
+    /// such as `python3 -m http.server`. The folder must be absent or empty
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["compare", "listen", "token", "no_browser"])]
+    pub export_page: Option<PathBuf>,
+    /// With --export-page: only tiles with their center in this box, in metres
+    #[arg(long, value_names = ["X0", "Y0", "Z0", "X1", "Y1", "Z1"], num_args = 6, requires = "export_page")]
+    pub region: Option<Vec<f64>>,
+    /// With --export-page: finest level to write. Voxels of level N have 2^N times the edge of the map's voxels; each
+    /// level more makes the folder smaller by a factor of about four
+    #[arg(long, value_name = "N", default_value_t = 0, requires = "export_page")]
+    pub finest: u8,
+    /// Print the URL, or a summary of the exported page, as JSON
     #[arg(long)]
     pub json: bool,
 }

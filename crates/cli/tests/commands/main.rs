@@ -64,3 +64,5 @@ mod registered_clouds;
 /// `view`, tested through its server.
 #[cfg(all(feature = "view", target_os = "linux"))]
 mod view;
+/// `view --export-page`.
+mod view_export;

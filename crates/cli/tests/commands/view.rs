@@ -17,7 +17,7 @@ const TOKEN: &str = "open_sesame";
 const PATIENCE: Duration = Duration::from_secs(60);
 
 /// A running `voxtile view`; stopped on drop.
-struct Viewer {
+pub(crate) struct Viewer {
     process: Child,
     address: SocketAddr,
 }
@@ -29,10 +29,10 @@ impl Drop for Viewer {
     }
 }
 
-struct Reply {
-    status: u16,
+pub(crate) struct Reply {
+    pub(crate) status: u16,
     head: String,
-    body: Vec<u8>,
+    pub(crate) body: Vec<u8>,
 }
 
 fn read_reply(stream: TcpStream) -> Reply {
@@ -59,7 +59,7 @@ impl Viewer {
     }
 
     /// Same as [`Viewer::of`], but waits for the levels of all maps.
-    fn ready(maps: &[&Path], cache: &Path) -> Self {
+    pub(crate) fn ready(maps: &[&Path], cache: &Path) -> Self {
         let viewer = Self::of(maps, cache);
         viewer.wait(|maps| maps.iter().all(|map| map["generation"] != 0 && map["pending_tiles"] == 0));
         viewer
@@ -80,10 +80,18 @@ impl Viewer {
     }
 
     /// Sends these bytes as a request.
-    fn send(&self, request: &str) -> Reply {
+    pub(crate) fn send(&self, request: &str) -> Reply {
         let mut stream = self.connect();
         stream.write_all(request.as_bytes()).unwrap();
         read_reply(stream)
+    }
+
+    /// Requests a path after the token, compressed.
+    pub(crate) fn compressed(&self, path: &str) -> Reply {
+        self.send(&format!(
+            "GET /{TOKEN}/{path} HTTP/1.1\r\nhost: {}\r\naccept-encoding: gzip\r\nconnection: close\r\n\r\n",
+            self.address
+        ))
     }
 
     /// Requests a raw path after the token.
@@ -94,7 +102,7 @@ impl Viewer {
         ))
     }
 
-    fn json(&self, path: &str) -> Value {
+    pub(crate) fn json(&self, path: &str) -> Value {
         let reply = self.get(path);
         let text = String::from_utf8_lossy(&reply.body).into_owned();
         assert_eq!(reply.status, 200, "{path}: {text}");
@@ -102,7 +110,7 @@ impl Viewer {
     }
 
     /// Returns the paths of all nodes with their versions, from the tileset and its subtrees.
-    fn nodes(&self, map: &str) -> Vec<String> {
+    pub(crate) fn nodes(&self, map: &str) -> Vec<String> {
         let mut nodes = Vec::new();
         let mut open = vec![self.json(&format!("maps/{map}/tileset.json"))["root"].clone()];
         while let Some(node) = open.pop() {
@@ -175,13 +183,13 @@ impl Viewer {
     }
 }
 
-fn run(arguments: &[&str]) -> String {
+pub(crate) fn run(arguments: &[&str]) -> String {
     let output = Command::new(cargo_bin("voxtile")).args(arguments).output().unwrap();
     assert!(output.status.success(), "{arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
     String::from_utf8(output.stdout).unwrap()
 }
 
-fn text(path: &Path) -> &str {
+pub(crate) fn text(path: &Path) -> &str {
     path.to_str().unwrap()
 }
 
@@ -216,7 +224,7 @@ fn exported(folder: &Path, map: &str) -> BTreeSet<[i64; 3]> {
         .collect()
 }
 
-fn a_map() -> (TempDir, PathBuf) {
+pub(crate) fn a_map() -> (TempDir, PathBuf) {
     let folder = tempfile::tempdir().unwrap();
     let map = folder.path().join("walls");
     build(folder.path(), &map, 0..3);

@@ -13,7 +13,7 @@ use voxtile::mapper::MapView;
 use voxtile::{Error, Layers, Result};
 use voxtile_formats::write::{OutputFormat, RowLayers, VoxelRow, VoxelsHead, WriteOptions};
 use voxtile_render::levels::{
-    ColouredVoxel, Levels, LevelsOf, NodeKey, NodeStore, TilesetContent, subtree, tileset,
+    ColouredVoxel, Levels, LevelsOf, NodeKey, NodeStore, TilesetContent, for_each_subtree, tileset,
 };
 
 /// Numbers of nodes and voxels written.
@@ -91,24 +91,9 @@ impl Tileset<'_> {
             }
             Ok::<(), Error>(())
         })?;
-        self.write_subtrees(&nodes, &root)
-    }
-
-    /// Writes the files referenced by a file, recursively.
-    fn write_subtrees(&self, nodes: &LevelsOf<'_, AnyMap>, file: &serde_json::Value) -> Result<()> {
-        let mut open = vec![file["root"].clone()];
-        while let Some(node) = open.pop() {
-            open.extend(node["children"].as_array().into_iter().flatten().cloned());
-            let uri = node["content"]["uri"].as_str().map(|uri| uri.trim_start_matches("../"));
-            let key = uri.and_then(|uri| uri.strip_prefix("subtree/")?.strip_suffix(".json")?.parse().ok());
-            if let Some(key) = key
-                && let Some(file) = subtree(nodes, self.store, TilesetContent::Meshes, key)?
-            {
-                self.write_json(&self.folder.join(format!("subtree/{key}.json")), &file)?;
-                open.push(file["root"].clone());
-            }
-        }
-        Ok(())
+        let mut write =
+            |key, file: &_| self.write_json(&self.folder.join(format!("subtree/{key}.json")), file);
+        for_each_subtree(&nodes, self.store, TilesetContent::Meshes, &root, &mut write)
     }
 
     fn write_node(&self, key: NodeKey, heights_m: [f64; 2]) -> Result<()> {

@@ -12,7 +12,7 @@
 //!               of their tiles, so that unchanged nodes are reused
 //! Difference    two states compared node by node                             difference
 //! compared      classes of the voxels of two maps
-//! tileset       nodes as 3D Tiles                                            tileset
+//! tileset       nodes as 3D Tiles, perhaps without the finest                tileset, from_level
 //! ```
 //!
 //! The finest nodes are the map's tiles, or parts of them if a tile has more than 128 voxels along an edge. They are
@@ -21,6 +21,7 @@
 mod cells;
 mod compared;
 mod difference;
+mod from_level;
 mod layer_planes;
 mod layer_sums;
 mod layer_totals;
@@ -40,9 +41,10 @@ mod tests;
 pub use cells::Kind;
 pub use compared::{ComparedLevels, ComparedLevelsBuilder, class_bit};
 pub use difference::Difference;
+pub use from_level::FromLevel;
 pub use layer_totals::LayerTotals;
 pub use levels_layers::ColouredVoxel;
 pub use levels_of_map::Levels;
 pub use node_key::NodeKey;
 pub use node_store::NodeStore;
-pub use tileset::{LevelsOf, TilesetContent, TilesetNodes, subtree, tileset};
+pub use tileset::{LevelsOf, TilesetContent, TilesetNodes, for_each_subtree, subtree, tileset};

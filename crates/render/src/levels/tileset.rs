@@ -48,6 +48,11 @@ pub trait TilesetNodes {
     /// Returns the level of nodes that are tiles.
     fn tile_level(&self) -> u8;
 
+    /// Returns whether a node is a tile that is divided into nodes, which are in a file of their own.
+    fn is_divided(&self, key: NodeKey) -> bool {
+        key.level == self.tile_level() && key.level > 0
+    }
+
     /// Returns the nodes inside a tile that is divided.
     ///
     /// # Errors
@@ -120,6 +125,34 @@ pub fn subtree(
     })))
 }
 
+/// Passes all files below a tileset file to `write`, each with its node.
+///
+/// # Errors
+///
+/// Fails if a tile cannot be read, or with the error of `write`.
+pub fn for_each_subtree(
+    nodes: &dyn TilesetNodes,
+    store: &NodeStore,
+    content: TilesetContent,
+    file: &Value,
+    write: &mut dyn FnMut(NodeKey, &Value) -> Result<()>,
+) -> Result<()> {
+    let mut open = vec![file["root"].clone()];
+    while let Some(node) = open.pop() {
+        open.extend(node["children"].as_array().into_iter().flatten().cloned());
+        let path =
+            node["content"]["uri"].as_str().and_then(|uri| uri.trim_start_matches("../").split('?').next());
+        let key = path.and_then(|path| path.strip_prefix("subtree/")?.strip_suffix(".json")?.parse().ok());
+        if let Some(key) = key
+            && let Some(file) = subtree(nodes, store, content, key)?
+        {
+            write(key, &file)?;
+            open.push(file["root"].clone());
+        }
+    }
+    Ok(())
+}
+
 struct Writer<'a> {
     nodes: &'a dyn TilesetNodes,
     store: &'a NodeStore,
@@ -163,7 +196,7 @@ impl Writer<'_> {
             None if key.level == self.nodes.tile_level() => Vec::new(),
             None => key.children().filter(|&child| self.is_written(child)).collect(),
         };
-        let is_divided_tile = within.is_none() && key.level == self.nodes.tile_level() && key.level > 0;
+        let is_divided_tile = within.is_none() && self.nodes.is_divided(key);
         let error_m =
             if children.is_empty() && !is_divided_tile { 0.0 } else { self.nodes.voxel_edge_m(key.level) };
         let own_m = self.nodes.corner_m(key);

@@ -7,6 +7,9 @@ import { createInterface } from 'node:readline';
 import { inflateSync } from 'node:zlib';
 import { Browser } from './browser.mjs';
 import { checkChanges } from './changes.mjs';
+import { checkColours } from './colours.mjs';
+import { checkExported } from './exported.mjs';
+import { checkOpacity, checkTools } from './tools.mjs';
 
 const voxtile = process.env.VOXTILE;
 const work = mkdtempSync(join(tmpdir(), 'voxtile-view-'));
@@ -145,7 +148,7 @@ async function checkHands(map) {
   const cropped = exported(join(work, 'cropped')).size;
   assert.ok(cropped > 0 && cropped < exported(map).size);
   await browser.until(`document.getElementById('state').textContent === 'ready' && voxtile.voxels().count === ${cropped}`, 30);
-  await browser.value('document.getElementById("uncut").click(); document.getElementById("play").click()');
+  await browser.value('document.getElementById("uncut").click(); document.getElementById("speed").value = 10; document.getElementById("play").click()');
   await browser.until('document.getElementById("play").ariaPressed === "false" && document.getElementById("scan").value === document.getElementById("scan").max', 20);
   await browser.ready();
   assert.equal(await browser.value('document.querySelectorAll("#panel > details:not([hidden])").length'), 5);
@@ -160,9 +163,23 @@ checks: try {
     step(await checkChanges({ browser, view, run, exported, countPixels: count, work }));
     break checks;
   }
+  if (process.env.ONLY === 'tools') {
+    const map = join(work, 'room');
+    run('build', scan(0), '-o', map, '--resolution', '0.1', '-q');
+    run('build', scan(7), '-o', map, '--append', '-q');
+    step(await checkTools({ browser, view, map, run, exported, work }));
+    run('build', scan(1), '-o', join(work, 'other'), '--resolution', '0.1', '-q');
+    await browser.open('about:blank');
+    await browser.open(await view(map, join(work, 'other')));
+    await browser.ready();
+    step(await checkOpacity({ browser, countPixels: count }));
+    break checks;
+  }
   const map = join(work, 'room');
   run('build', scan(0), '-o', map, '--resolution', '0.1', '-q');
   const url = await view(map);
+  const colourMaps = (await (await fetch(`${url}maps.json`)).json()).color_maps;
+  const { stops } = colourMaps[0];
   await browser.open(url);
   await browser.ready();
   await browser.value('voxtile.detail = 0.1');
@@ -309,7 +326,7 @@ checks: try {
   // The colours of obstacles, and of free voxels near to them and far away from them.
   const drawn = async () => {
     const near = (colour) => `(r, g, b) => Math.hypot(r - ${colour[0]}, g - ${colour[1]}, b - ${colour[2]}) < 4`;
-    return [await count(near([226, 230, 236])), await count(near([38, 13, 74]).replace('< 4', '< 60')), await count(near([38, 104, 142]).replace('< 4', '< 60'))];
+    return [await count(near([226, 230, 236])), await count(near(stops[0]).replace('< 4', '< 60')), await count(near(stops[11]).replace('< 4', '< 60'))];
   };
   const layerPixels = await drawn();
   assert.ok(layerPixels.every((pixels) => pixels > 500), `${layerPixels} pixels`);
@@ -351,7 +368,7 @@ checks: try {
   await browser.ready();
   const requested = () => browser.value('performance.getEntriesByType("resource").filter(({ name }) => name.includes("layer")).length');
   const options = () => browser.value('[...document.getElementById("colour").options].map(({ value }) => value)');
-  assert.deepEqual(await options(), ['height', 'probability', 'count', 'scan', 'rgb', 'intensity', 'class', 'age']);
+  assert.deepEqual(await options(), ['height', 'above', 'probability', 'count', 'scan', 'rgb', 'intensity', 'class', 'age']);
   assert.equal(await requested(), 0, 'values of layers are loaded only if they are shown');
   await browser.value('document.getElementById("layers").querySelectorAll("input")[1].click(); voxtile.lookAt([2, 2, 6], [2, 2.001, 0])');
   const nearPixels = (colour) => count(`(r, g, b) => Math.hypot(r - ${colour[0]}, g - ${colour[1]}, b - ${colour[2]}) < 12`);
@@ -372,10 +389,10 @@ checks: try {
   const byClass = await pixelsOf([166, 124, 82], [236, 126, 84]);
   assert.ok(byClass[0] > 20000 && byClass[1] > 2000, `${byClass} pixels by class`);
   assert.match(await colourBy('intensity'), /30 90/);
-  const byIntensity = await pixelsOf([38, 13, 74], [252, 232, 66]);
+  const byIntensity = await pixelsOf(stops[0], stops.at(-1));
   assert.ok(byIntensity[0] > 20000 && byIntensity[1] > 2000, `${byIntensity} pixels by intensity`);
   assert.match(await colourBy('age'), /2011-09-26 13:04:32 13:06:12/);
-  const byAge = await pixelsOf([38, 13, 74], [252, 232, 66]);
+  const byAge = await pixelsOf(stops[0], stops.at(-1));
   assert.ok(byAge[0] > 10000 && byAge[1] > 10000, `${byAge} pixels by age`);
   await browser.value('voxtile.clickAt(...voxtile.screenOf([1.55, 1.55, 1.1]))');
   await browser.until('/6 building: 1/.test(document.getElementById("answer").innerText)', 10);
@@ -390,18 +407,21 @@ checks: try {
   await browser.value(`document.getElementById('snapshot').value = 'before'; document.getElementById('snapshot').dispatchEvent(new Event('change'))`);
   await browser.until('/13:06:12/.test(document.getElementById("legend-ends").innerText)', 30);
   await browser.ready();
-  assert.ok((await pixelsOf([38, 13, 74]))[0] > 10000, 'the snapshot has its own times');
+  assert.ok((await pixelsOf(stops[0]))[0] > 10000, 'the snapshot has its own times');
   await browser.value(`document.getElementById('snapshot').value = ''; document.getElementById('snapshot').dispatchEvent(new Event('change'))`);
   await colourBy('height');
   assert.deepEqual(browser.errors, []);
   step(`layers: ${byColour} pixels in colour, ${byClass} by class, ${byIntensity} by intensity, ${byAge} by age; they follow a build and a snapshot`);
+  step(await checkColours({ browser, view, map: layered, countPixels: count }));
+  step(await checkExported({ browser, view, map: layered, run, work, ended }));
+  server = plain;
   const changes = await checkChanges({ browser, view, run, exported, countPixels: count, work });
   server = plain;
   step(`changes between two maps, ${changes}`);
   await browser.open('about:blank');
   await browser.open(url);
   await browser.ready();
-  assert.deepEqual(await options(), ['height', 'probability', 'count', 'scan']);
+  assert.deepEqual(await options(), ['height', 'above', 'probability', 'count', 'scan']);
 
   for (const [width, height, dark] of [[360, 640, false], [1280, 720, true]]) {
     await browser.size(width, height, dark);
@@ -413,6 +433,12 @@ checks: try {
   assert.deepEqual(browser.errors, []);
 
   step(await checkHands(map));
+  const running = server;
+  step(await checkTools({ browser, view, map, run, exported, work }));
+  server = running;
+  await browser.open('about:blank');
+  await browser.open(url);
+  await browser.ready();
 
   const atRest = await browser.value('voxtile.drawCalls()');
   await browser.value('voxtile.lookAt(...Object.values(voxtile.camera()))');
@@ -479,6 +505,7 @@ checks: try {
   })));
   await follows(map, other);
   assert.deepEqual(browser.errors, []);
+  step(await checkOpacity({ browser, countPixels: count }));
   step('a map without the snapshot shows its current state, a deleted snapshot is left, and all maps are updated');
 
   if (process.argv[2]) {

@@ -1,5 +1,6 @@
 // Distances to obstacles in a layer of voxels, whose format docs/view.md describes.
 
+import { contentOf } from './content.js';
 import { OBSTACLE, colourAt } from './palette.js';
 
 const HEADER_BYTES = 56;
@@ -7,8 +8,7 @@ const HEADER_BYTES = 56;
 // Returns the layer around a point: lower corner, size in voxels, and values by y, then x.
 export async function readDistances(url, signal) {
   const response = await fetch(url, { signal });
-  if (!response.ok) throw new Error((await response.json().catch(() => null))?.error ?? `HTTP status ${response.status}`);
-  const buffer = await response.arrayBuffer();
+  const buffer = await contentOf(response);
   const view = new DataView(buffer);
   if (view.getUint32(0) !== 0x56584431) throw new Error('the server has another version');
   const [width, height] = [view.getUint32(4, true), view.getUint32(8, true)];

@@ -1,5 +1,6 @@
 import * as THREE from 'three';
 import { FAILED, TilesRenderer } from '3d-tiles-renderer';
+import { contentOf, plain } from './content.js';
 import { BY_LAYER } from './layers.js';
 import { KIND, parseNode } from './node.js';
 import { bytesOf, meshOf } from './mesh.js';
@@ -36,6 +37,7 @@ export class Layer {
     this.tiles = this.open();
     this.next = null;
     this.isShown = true;
+    this.opacity = 1;
   }
 
   open() {
@@ -44,10 +46,14 @@ export class Layer {
     tiles.layerName = legend && this.layerName;
     tiles.errorTarget = BEST_ERROR;
     tiles.registerPlugin({
-      preprocessURL: (url) => (tiles.layerName && url.includes('.vox?') ? `${url}&layer=${tiles.layerName}` : url),
-      parseToMesh: (buffer, tile, extension) => {
+      preprocessURL: (url) => {
+        if (!tiles.layerName || !url.includes('.vox?')) return url;
+        // An exported page has files with the values of each layer.
+        return this.viewer.isExported ? url.replace('.vox?', `.${tiles.layerName}.vox?`) : `${url}&layer=${tiles.layerName}`;
+      },
+      parseToMesh: async (buffer, tile, extension) => {
         if (extension !== 'vox') return null;
-        const node = parseNode(buffer);
+        const node = parseNode(await plain(buffer));
         this.scale = { least: node.least, most: node.most };
         const mesh = meshOf(node, this.material, legend);
         const group = new THREE.Group();
@@ -257,8 +263,7 @@ export class Layer {
     this.waits = (this.waits ?? 0) + 1;
     try {
       const response = await fetch(url, { signal: load.request.signal });
-      if (!response.ok) throw new Error(`${response.status}`);
-      const mesh = meshOf(parseNode(await response.arrayBuffer()), this.materials[kind]);
+      const mesh = meshOf(parseNode(await contentOf(response)), this.materials[kind]);
       if (!isCurrent() || this.isGone) {
         mesh.geometry.dispose();
         return;

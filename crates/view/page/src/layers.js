@@ -42,6 +42,16 @@ export function paintOf({ count, values }, legend) {
   return paint;
 }
 
+// Returns the value of a voxel as text, with the legend of its layer; `null` without a value.
+export function valueText({ name, planes, valueOf }, i, legend) {
+  if (planes) return planes[3][i] ? planes.slice(0, 3).map((plane) => plane[i]).join(' ') : null;
+  const value = valueOf(i);
+  if (value === null) return null;
+  if (name === 'intensity') return value.toFixed(1);
+  if (name === 'time') return timeText(value, legend);
+  return className(legend.classes.find((one) => one.class === Math.round(value)) ?? { class: Math.round(value) });
+}
+
 const rangeOf = (legend) => legend?.range ?? legend?.range_s ?? null;
 
 // Joins the legends of one layer of several maps, so that equal colours have equal meanings.

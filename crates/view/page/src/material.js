@@ -10,6 +10,8 @@ attribute vec4 paint;
 uniform float threshold;
 uniform vec3 low, high;
 uniform int colourBy;
+uniform highp sampler2D reference;
+uniform vec3 referenceAt;
 uniform vec2 range;
 uniform float lastScan;
 uniform int kind;
@@ -21,6 +23,18 @@ varying float light;
 varying float change;
 varying vec3 classColour;
 varying vec4 layerColour;
+// Height of the trajectory or ground, between the centers of cells.
+float referenceOf(vec2 at) {
+  vec2 cell = (at - referenceAt.xy) / referenceAt.z - 0.5;
+  ivec2 last = textureSize(reference, 0) - 1;
+  ivec2 low = clamp(ivec2(floor(cell)), ivec2(0), last);
+  ivec2 high = min(low + 1, last);
+  vec2 along = clamp(cell - vec2(low), 0.0, 1.0);
+  vec2 below = vec2(texelFetch(reference, low, 0).r, texelFetch(reference, ivec2(high.x, low.y), 0).r);
+  vec2 beyond = vec2(texelFetch(reference, ivec2(low.x, high.y), 0).r, texelFetch(reference, high, 0).r);
+  vec2 rows = mix(below, beyond, along.y);
+  return mix(rows.x, rows.y, along.x);
+}
 void main() {
   int side = int(place.w + 0.5);
   bool isSeen = kind != 0 || (levels.x >= threshold && (levels.y < 0.5 || levels.y - 1.0 < threshold));
@@ -47,13 +61,15 @@ void main() {
   corner = uv;
   change = levels.x;
   layerColour = paint;
-  float value = colourBy <= 0 ? mid.z : colourBy == 1 ? levels.x : colourBy == 2 ? levels.z : lastScan;
+  float value = colourBy <= 0 ? mid.z : colourBy == 1 ? levels.x : colourBy == 2 ? levels.z
+    : colourBy == 3 ? lastScan : mid.z - referenceOf(mid.xy);
   share = clamp((value - range.x) / max(range.y - range.x, 1e-6), 0.0, 1.0);
   gl_Position = projectionMatrix * modelViewMatrix * vec4(place.xyz + at, 1.0);
 }`;
 
 const fragment = /* glsl */ `
 uniform sampler2D ramp;
+uniform vec2 opacity;
 uniform vec4 tint;
 uniform vec3 changes[3];
 uniform int kind;
@@ -67,7 +83,14 @@ varying float change;
 varying vec3 classColour;
 varying vec4 layerColour;
 vec3 linearOf(vec3 c) { return mix(c / 12.92, pow((c + 0.055) / 1.055, vec3(2.4)), step(0.04045, c)); }
+// Thresholds of 4 x 4 pixels, in an order in which neighbours differ most.
+float thresholdOf(ivec2 at) {
+  ivec2 low = at & 1, high = at >> 1 & 1;
+  return (float(4 * ((low.x ^ low.y) * 2 + low.y) + (high.x ^ high.y) * 2 + high.y) + 0.5) / 16.0;
+}
 void main() {
+  // A map of partial opacity leaves out pixels, other ones than the other maps do: no order of drawing is needed.
+  if (opacity.x < 1.0 && thresholdOf(ivec2(gl_FragCoord.xy) + ivec2(opacity.y) * ivec2(1, 2)) >= opacity.x) discard;
   vec3 colour = texture2D(ramp, vec2(share * 255.0 / 256.0 + 0.5 / 256.0, 0.5)).rgb;
   if (kind == 3) colour = change < 1.5 ? changes[0] : change < 2.5 ? changes[1] : changes[2];
   else if (kind == 4) colour = classColour;
@@ -107,6 +130,8 @@ export function makeMaterial(kind, shared) {
       classColours: { value: CLASSES.map(linear) },
       tint: { value: own ? new THREE.Vector4(own.r, own.g, own.b, 1) : new THREE.Vector4(0, 0, 0, 0) },
       threshold: { value: 0 },
+      // Opacity, and the number of the map.
+      opacity: { value: new THREE.Vector2(1, 0) },
       range: { value: new THREE.Vector2(0, 1) },
       lastScan: { value: 0 },
       // Name of the layer that is shown, and whether the drawn node has its colours (1) or its numbers (2).
@@ -162,6 +187,9 @@ export const sharedUniforms = () => ({
   low: { value: new THREE.Vector3(-Infinity, -Infinity, -Infinity) },
   high: { value: new THREE.Vector3(Infinity, Infinity, Infinity) },
   colourBy: { value: 0 },
+  // Heights of the trajectory or ground; lower corner along x and y, and edge of a cell.
+  reference: { value: null },
+  referenceAt: { value: new THREE.Vector3(0, 0, 1) },
   // Range of the colours of intensities and times.
   paintRange: { value: [0, 1] },
   // Classes of a comparison that are shown, as bits.

@@ -1,12 +1,13 @@
 // Reads points on moving objects, whose format docs/view.md describes.
 
+import { contentOf } from './content.js';
+
 const HEADER_BYTES = 56;
 
 // Returns the points as offsets from their origin, in metres. They are left out if `known` is the version of the marks.
 export async function readMoving(url, known) {
   const response = await fetch(known === null ? url : `${url}?v=${known}`);
-  if (!response.ok) throw new Error((await response.json().catch(() => null))?.error ?? `HTTP status ${response.status}`);
-  const buffer = await response.arrayBuffer();
+  const buffer = await contentOf(response);
   const view = new DataView(buffer);
   if (view.getUint32(0) !== 0x56584d31) throw new Error('the server has another version');
   const count = view.getUint32(4, true);

@@ -10,6 +10,9 @@ const line = (points, colour, closed = false) => {
 export const OF_FIRST_MAP = 1;
 const NAMES_OF_FIRST_MAP = ['path', 'sensor', 'moving', 'distances'];
 
+// Lines that no voxel hides.
+const ABOVE_ALL = ['measure', 'section'];
+
 const EDGES = [[0, 1], [2, 3], [4, 5], [6, 7], [0, 2], [1, 3], [4, 6], [5, 7], [0, 4], [1, 5], [2, 6], [3, 7]];
 
 // Overlays in map coordinates, in metres.
@@ -45,6 +48,7 @@ export class Overlays {
     const drawn = line(points.map((p) => p.map((k, axis) => k - base[axis])), colour);
     drawn.position.set(...base);
     drawn.renderOrder = 2;
+    drawn.material.depthTest = !ABOVE_ALL.includes(name);
     this.set(name, drawn);
   }
 

@@ -1,7 +1,7 @@
 import * as THREE from 'three';
 
-// From dark to bright in even steps, readable with colour blindness.
-const STOPS = [[38, 13, 74], [57, 62, 138], [38, 104, 142], [31, 144, 138], [74, 184, 108], [160, 213, 62], [252, 232, 66]];
+// Stops of the chosen colour map, in sRGB; the server sends those of all maps.
+let stops = [[0, 0, 0], [255, 255, 255]];
 // Blue, orange and grey are distinct with colour blindness.
 export const CHANGES = [[0, 114, 208], [230, 126, 0], [150, 154, 162]];
 // Classes of a comparison in the order of the server; no two of these six colours are similar, also with colour blindness.
@@ -13,21 +13,22 @@ export const OBSTACLE = [226, 230, 236];
 export const LAYERS = [[0, 114, 178], [230, 159, 0], [0, 158, 115], [204, 121, 167], [86, 180, 233], [213, 94, 0]];
 
 export function colourAt(share) {
-  const along = Math.min(Math.max(share, 0), 1) * (STOPS.length - 1);
-  const low = Math.min(Math.floor(along), STOPS.length - 2);
-  return STOPS[low].map((from, k) => Math.round(from + (along - low) * (STOPS[low + 1][k] - from)));
+  const along = Math.min(Math.max(share, 0), 1) * (stops.length - 1);
+  const low = Math.min(Math.floor(along), stops.length - 2);
+  return stops[low].map((from, k) => Math.round(from + (along - low) * (stops[low + 1][k] - from)));
 }
 
-const texture = (colours) => {
-  const data = new Uint8Array(colours.flatMap((colour) => [...colour, 255]));
-  const made = new THREE.DataTexture(data, colours.length, 1);
-  made.colorSpace = THREE.SRGBColorSpace;
-  made.magFilter = made.minFilter = THREE.LinearFilter;
-  made.needsUpdate = true;
-  return made;
-};
+// Colours of values, for the drawing.
+export const ramp = new THREE.DataTexture(new Uint8Array(4 * 256), 256, 1);
+ramp.colorSpace = THREE.SRGBColorSpace;
+ramp.magFilter = ramp.minFilter = THREE.LinearFilter;
 
-export const ramp = texture(Array.from({ length: 256 }, (_, k) => colourAt(k / 255)));
+// Chooses a colour map of `maps.json`.
+export function chooseColours(map) {
+  ({ stops } = map);
+  for (let k = 0; k < 256; k++) ramp.image.data.set([...colourAt(k / 255), 255], 4 * k);
+  ramp.needsUpdate = true;
+}
 
 // Draws the colours of a range, as shares of the canvas's width.
 export function drawLegend(canvas, low = 0, high = 1) {

@@ -1,5 +1,6 @@
 // Where most voxels of a map are, and which values they have: from its coarsest nodes.
 
+import { contentOf } from './content.js';
 import { parseNode } from './node.js';
 
 // Number of voxels of the first view, sampled evenly.
@@ -20,18 +21,15 @@ export function percentiles(values) {
   return [share(sorted, 0.02), share(sorted, 0.98)];
 }
 
-async function answerOf(url) {
-  const response = await fetch(url);
-  if (!response.ok) throw new Error(`HTTP status ${response.status}`);
-  return response;
-}
+const bytesOf = async (url) => contentOf(await fetch(url));
+const jsonOf = async (url) => JSON.parse(new TextDecoder().decode(await bytesOf(url)));
 
 // Returns the coarsest nodes of a tile: its own, or those of the file that has it.
 async function nodesOf(tile, base) {
   const uris = [tile.content, ...(tile.contents ?? [])].filter(Boolean).map(({ uri }) => new URL(uri, base));
   const own = uris.find(({ pathname }) => pathname.endsWith('.vox'));
-  if (own) return [parseNode(await (await answerOf(own)).arrayBuffer())];
-  const files = await Promise.all(uris.map(async (uri) => nodesOf((await (await answerOf(uri)).json()).root, uri)));
+  if (own) return [parseNode(await bytesOf(own))];
+  const files = await Promise.all(uris.map(async (uri) => nodesOf((await jsonOf(uri)).root, uri)));
   if (files.length) return files.flat();
   return (await Promise.all((tile.children ?? []).map((child) => nodesOf(child, base)))).flat();
 }

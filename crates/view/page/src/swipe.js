@@ -10,9 +10,10 @@ export function sidesOf(later, earlier) {
 }
 
 export class Swipe {
-  // Calls `moved` after the user has moved the border.
-  constructor(viewer, moved) {
-    Object.assign(this, { viewer, moved });
+  constructor(viewer) {
+    this.viewer = viewer;
+    // Called after the user has moved the border.
+    this.moved = () => {};
     this.drag = null;
     const border = $('border');
     border.addEventListener('pointerdown', (event) => this.hold(event));

@@ -9,9 +9,9 @@ import { OF_FIRST_MAP, Overlays } from './overlays.js';
 import { Shading } from './shading.js';
 
 const MOST_CALLS = 200;
-// Draw calls reserved for overlays: trajectory, sensor, moving points, distances, marks, change, ground, grid, bounding box;
+// Draw calls reserved for overlays: trajectory, sensor, moving points, distances, marks, change, ground, grid, bounding box, section, cut box;
 // and for the shading.
-const OVERLAY_CALLS = 14;
+const OVERLAY_CALLS = 16;
 
 // Scene with layers, overlays and camera. Draws only after changes.
 export class Viewer {
@@ -34,6 +34,8 @@ export class Viewer {
     this.shared = sharedUniforms();
     this.overlays = new Overlays(this.world);
     this.layers = [];
+    // Whether the page is a folder of files, without the server of `voxtile view`.
+    this.isExported = false;
     // In a swipe, layers of side 0 are drawn left of a share of the width, and layers of side 1 right of it.
     this.isSplit = false;
     this.share = 0.5;
@@ -211,18 +213,28 @@ export class Viewer {
     else setTimeout(again, 30);
   }
 
+  // Sets the heights above which colours show heights.
+  refer(reference) {
+    this.shared.reference.value?.dispose();
+    this.shared.reference.value = reference.texture(this.middle[2]);
+    const [x, y] = this.toScene([...reference.low, 0]);
+    this.shared.referenceAt.value.set(x, y, reference.cell);
+    this.wake();
+  }
+
   // Sets the uniforms from the controls.
   paint() {
-    this.shared.colourBy.value = ['height', 'probability', 'count', 'scan'].indexOf(this.colour);
+    this.shared.colourBy.value = ['height', 'probability', 'count', 'scan', 'above'].indexOf(this.colour);
     this.shared.paintRange.value = this.range;
     this.shared.classes.value = this.classes;
     this.shared.low.value.set(...this.toScene(this.cut.low));
     this.shared.high.value.set(...this.toScene(this.cut.high));
-    for (const layer of this.layers) {
+    for (const [k, layer] of this.layers.entries()) {
       const uniforms = layer.material.uniforms;
+      uniforms.opacity.value.set(layer.opacity, k);
       uniforms.threshold.value = this.threshold;
       // Voxels whose values are not loaded yet are coloured by height.
-      const isHeight = !['probability', 'count', 'scan'].includes(this.colour);
+      const isHeight = !['probability', 'count', 'scan', 'above'].includes(this.colour);
       uniforms.range.value.set(...(isHeight ? this.heights.map((k) => k + this.world.position.z) : this.range));
       uniforms.layer.value = BY_LAYER[this.colour] ?? null;
     }
