@@ -1,4 +1,4 @@
-//! Checks the rule that tells rooms from the open, and pictures without ceilings.
+//! Checks the rule that separates rooms from open places, and pictures without ceilings.
 
 use std::collections::HashMap;
 use voxtile::scan::PointBatch;

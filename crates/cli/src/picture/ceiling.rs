@@ -13,7 +13,7 @@ pub struct Ceiling {
 }
 
 impl Ceiling {
-    /// Returns the limit of a picture; `is_from_above` says whether a ceiling would hide the map.
+    /// Returns the limit of a picture; `is_from_above`: whether a ceiling would hide the map.
     pub fn of(choice: MaxHeight, map: &AnyMap, path: &[Point], is_from_above: bool) -> Result<Self> {
         let (max_height_m, is_of_sensor) = match (choice, map) {
             (MaxHeight::Metres(height_m), _) => (Some(height_m), false),
