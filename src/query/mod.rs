@@ -30,7 +30,6 @@ mod map_queries;
 mod merged;
 mod nearest;
 mod nearest_in_brick;
-mod occupancies;
 mod occupancy;
 pub mod occupied_set;
 mod octree_blocks;

@@ -1,6 +1,5 @@
 use crate::config::MapConfig;
-use crate::maths::sigmoid;
-use crate::sensor::Evidence;
+use crate::sensor::{Evidence, probability_of};
 
 /// Occupancy of a voxel or octree node.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -36,16 +35,10 @@ impl Occupancy {
     pub fn of_log_odds(config: &MapConfig, log_odds: Option<f64>) -> Self {
         match log_odds {
             None => Self::Unknown,
-            Some(log_odds) => Self::with_probability(config, log_odds, sigmoid(log_odds)),
-        }
-    }
-
-    /// Returns the occupancy for log-odds whose probability is known.
-    #[inline]
-    pub(super) fn with_probability(config: &MapConfig, log_odds: f64, probability: f64) -> Self {
-        match log_odds >= config.occupied_log_odds() {
-            true => Self::Occupied(probability),
-            false => Self::Free(probability),
+            Some(log_odds) if log_odds >= config.occupied_log_odds() => {
+                Self::Occupied(probability_of(log_odds))
+            }
+            Some(log_odds) => Self::Free(probability_of(log_odds)),
         }
     }
 

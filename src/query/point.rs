@@ -1,5 +1,4 @@
 use super::Occupancy;
-use super::occupancies::Occupancies;
 use super::points_by_tile::PointsByTile;
 use crate::error::Result;
 use crate::mapper::MapView;
@@ -160,10 +159,7 @@ impl<A> PartOfTile<'_, A> {
 
 pub(super) fn occupancy_at_points<V: MapView>(view: &V, points: &[Point]) -> Result<Vec<Occupancy>> {
     let config = view.config();
-    at_points(view, points, Occupancy::Unknown, || {
-        let mut occupancies = Occupancies::new(config);
-        move |evidence| occupancies.of(evidence)
-    })
+    at_points(view, points, Occupancy::Unknown, || |evidence| Occupancy::of(config, Some(evidence)))
 }
 
 pub(super) fn evidence_at_points<V: MapView>(view: &V, points: &[Point]) -> Result<Vec<Option<Evidence>>> {

@@ -17,5 +17,5 @@ pub use evidence::Evidence;
 pub use iwlo::Iwlo;
 pub use log_odds::LogOdds;
 pub use model::{Observation, SensorModel};
-pub use probabilities::Probabilities;
+pub use probabilities::probability_of;
 pub use sweep::{NO_TIME, Sweep, ToStamp};

@@ -11,8 +11,8 @@ use std::hint::select_unpredictable;
 pub struct Torus {
     /// Size of the torus minus one, for each axis.
     masks: [u32; 3],
-    /// Position of each axis's bits in the index of a slot.
-    shifts: [u32; 3],
+    /// Slots between neighbors along y and z.
+    strides: [usize; 2],
     slots: Vec<Slot>,
     far: FxHashMap<Cell, u32>,
     /// Number of cells.
@@ -53,7 +53,7 @@ impl Torus {
     }
 
     /// The number of a cell, or [`Torus::NONE`].
-    #[inline]
+    #[inline(always)]
     pub fn get(&self, cell: Cell) -> u32 {
         let slot = &self.slots[self.slot_of(cell)];
         if !self.far.is_empty() && slot.cell != cell {
@@ -113,7 +113,7 @@ impl Torus {
     /// Enlarges the torus along an axis, and moves cells from the hash map that now fit.
     fn enlarge(&mut self, axis: usize, bits: u32) {
         self.masks[axis] = ((self.masks[axis] + 1) << bits) - 1;
-        self.shifts = shifts(self.masks);
+        self.strides = strides(self.masks);
         let slots = vec![EMPTY; self.slots.len() << bits];
         // `put` succeeds, because cells with separate slots also have separate slots in a larger torus.
         for slot in std::mem::replace(&mut self.slots, slots) {
@@ -126,24 +126,24 @@ impl Torus {
         self.far = far;
     }
 
-    #[inline]
+    #[inline(always)]
     fn slot_of(&self, cell: Cell) -> usize {
-        let part = |k: usize| (cell[k] as u32 & self.masks[k]) << self.shifts[k];
-        (part(0) | part(1) | part(2)) as usize
+        let part = |k: usize| (cell[k] as u32 & self.masks[k]) as usize;
+        part(0) + part(1) * self.strides[0] + part(2) * self.strides[1]
     }
 }
 
 impl Default for Torus {
     fn default() -> Self {
-        Self { masks: [0; 3], shifts: [0; 3], slots: vec![EMPTY], far: FxHashMap::default(), len: 0 }
+        Self { masks: [0; 3], strides: [1; 2], slots: vec![EMPTY], far: FxHashMap::default(), len: 0 }
     }
 }
 
 const EMPTY: Slot = Slot { cell: [0; 3], number: Torus::NONE };
 
-fn shifts(masks: [u32; 3]) -> [u32; 3] {
-    let [x, y, _] = masks.map(u32::trailing_ones);
-    [0, x, x + y]
+fn strides(masks: [u32; 3]) -> [usize; 2] {
+    let [x, y, _] = masks.map(|mask| mask as usize + 1);
+    [x, x * y]
 }
 
 #[cfg(test)]

@@ -32,7 +32,7 @@ pub(crate) struct Address {
 }
 
 impl Address {
-    #[inline]
+    #[inline(always)]
     pub(crate) fn of_key(key: VoxelKey) -> Self {
         // Of the lowest five bits of a coordinate, the lower three are the position in the brick, and the upper two are
         // the position of the brick in its block.
@@ -73,13 +73,14 @@ impl BrickDirectory {
     }
 
     /// Number of the brick at an address; 0 if it is absent.
-    #[inline]
+    // A query of a point is so short that a call, and an address in memory, would take a fifth of its time.
+    #[inline(always)]
     pub(crate) fn get(&self, at: Address) -> u32 {
         // Branchless, because the CPU cannot predict whether a brick exists.
         self.in_block(self.block(at), at)
     }
 
-    #[inline]
+    #[inline(always)]
     pub(crate) fn block(&self, at: Address) -> u32 {
         self.blocks.get(at.block)
     }

@@ -67,6 +67,10 @@ pub struct Built {
     pub bytes_read: u64,
     /// Bytes written to the disk, to any file.
     pub bytes_written: u64,
+    /// Number of files opened or created, and of reads at a place of their own.
+    pub accesses: u64,
+    /// Number of syncs; files that are synced together count once.
+    pub syncs: u64,
     /// Number of tiles read.
     pub loads: u64,
     /// Number of tiles written.
@@ -181,7 +185,8 @@ impl Build {
         let statistics = mapper.statistics();
         let IoCounts { loads, saves, .. } = statistics.io;
         let (bytes_read, bytes_written) = (meter.bytes_read(), meter.bytes_written());
-        Ok(Built { tiles: statistics.tiles, bytes_read, bytes_written, loads, saves, ..built })
+        let (tiles, accesses, syncs) = (statistics.tiles, meter.accesses(), meter.syncs());
+        Ok(Built { tiles, bytes_read, bytes_written, accesses, syncs, loads, saves, ..built })
     }
 }
 

@@ -43,6 +43,8 @@ pub struct MeteredDisk {
 pub struct Meter {
     bytes_read: AtomicU64,
     bytes_written: AtomicU64,
+    accesses: AtomicU64,
+    syncs: AtomicU64,
     bucket: Option<Bucket>,
     sync: Duration,
     access: Duration,
@@ -98,6 +100,16 @@ impl Meter {
         self.bytes_written.load(Ordering::Relaxed)
     }
 
+    /// Number of files opened or created, and of reads at a place of their own.
+    pub fn accesses(&self) -> u64 {
+        self.accesses.load(Ordering::Relaxed)
+    }
+
+    /// Number of syncs; files that are synced together count once.
+    pub fn syncs(&self) -> u64 {
+        self.syncs.load(Ordering::Relaxed)
+    }
+
     fn count(&self, counter: &AtomicU64, bytes: usize) {
         counter.fetch_add(bytes as u64, Ordering::Relaxed);
         if let Some(bucket) = &self.bucket {
@@ -107,6 +119,7 @@ impl Meter {
 
     /// Waits for all earlier writes and for syncs, one after another.
     fn sync(&self, syncs: u32) {
+        self.syncs.fetch_add(syncs.into(), Ordering::Relaxed);
         if let Some(bucket) = &self.bucket {
             bucket.occupy(syncs * self.sync);
             bucket.drain();
@@ -115,6 +128,7 @@ impl Meter {
 
     /// Waits for the access to a file.
     fn access(&self) {
+        self.accesses.fetch_add(1, Ordering::Relaxed);
         if let Some(bucket) = &self.bucket {
             bucket.occupy(self.access);
         }
@@ -274,7 +288,9 @@ mod tests {
         assert_eq!([files.len(), folders.len()], [2, 1]);
         assert_eq!(disk.read_at(&path, 90, 20).unwrap(), [7; 10]);
         assert!(begin.elapsed() >= Duration::from_millis(58), "{:?}", begin.elapsed());
-        assert_eq!([disk.meter().bytes_written(), disk.meter().bytes_read()], [100, 10]);
+        let meter = disk.meter();
+        assert_eq!([meter.bytes_written(), meter.bytes_read()], [100, 10]);
+        assert_eq!([meter.accesses(), meter.syncs()], [2, 2]);
     }
 
     #[test]

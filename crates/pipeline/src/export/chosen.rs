@@ -4,7 +4,7 @@ use crate::watch::Gauge;
 use voxtile::mapper::{MapReader, MapView, Stoppable};
 use voxtile::maths::least_logit;
 use voxtile::scan::Stop;
-use voxtile::sensor::Probabilities;
+use voxtile::sensor::probability_of;
 use voxtile::space::{Aabb, Grid, Point, TileIndex, VoxelBox, VoxelIndex};
 use voxtile::tile::{Voxel, VoxelLayers};
 use voxtile::{Error, Layers, MapQueries, Result};
@@ -116,14 +116,13 @@ impl Chosen {
         let grid = map.config().grid;
         let of_map = map.config().layers();
         let mut tiles = Tiles { all: map.tile_indices(), done: 0, gauge };
-        let mut probabilities = Probabilities::default();
-        let mut row_of = |Voxel { index, evidence, .. }, tile: TileIndex, made: Option<VoxelLayers>| {
+        let row_of = |Voxel { index, evidence, .. }, tile: TileIndex, made: Option<VoxelLayers>| {
             let offset =
                 made.as_ref().filter(|_| self.mean_points).and_then(|made| made.mean_offset(&of_map));
             VoxelRow {
                 index,
                 center_m: point_m(index, offset.unwrap_or_default()),
-                probability: probabilities.of(evidence.log_odds),
+                probability: probability_of(evidence.log_odds),
                 log_odds: evidence.log_odds,
                 observation_count: evidence.observation_count,
                 tile: tile.to_array(),

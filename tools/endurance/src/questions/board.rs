@@ -101,6 +101,8 @@ fn table(case: &str, runs: &[Run]) -> Table {
         "flush: worst ms",
         "peak MiB",
         "written MB",
+        "accesses",
+        "syncs",
     ];
     let mut table = Table::new("board", caption, columns);
     for run in runs {
@@ -118,6 +120,8 @@ fn table(case: &str, runs: &[Run]) -> Table {
             Cell::Number(built.flush_ms(), 1),
             Cell::Number(mib(built.peak_resident_bytes as f64), 0),
             Cell::Number(built.bytes_written as f64 / 1e6, 1),
+            Cell::Count(built.accesses),
+            Cell::Count(built.syncs),
         ]);
     }
     table
