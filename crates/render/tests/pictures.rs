@@ -176,6 +176,21 @@ fn any_map_has_a_picture() {
     assert_eq!(draw(&plain(), &far).solid_cells, 2);
 }
 
+#[test]
+fn single_rays_do_not_make_the_rest_small() {
+    let mut voxels: Vec<Point> = (0..2_500).map(|k| center([k % 50, k / 50, 0])).collect();
+    voxels.extend((0..10).map(|k| center([60 + 50 * k, 20, 0])));
+    let map = map_of(&voxels, &[]);
+    let plain = || plain().with_size_px([700; 2]);
+    let drawn = draw(&plain(), &map);
+    assert_eq!((drawn.region_m.unwrap().max[0], drawn.solid_cells), (25.0, 2_500));
+    let all = Aabb { min: [-1e9; 3], max: [1e9; 3] };
+    let whole = draw(&plain().with_region(all), &map);
+    assert_eq!(whole.solid_cells, 2_510);
+    let grown = plain().draw_difference(&map_of(&voxels[..2_500], &[]), &map, |_, _| {}).unwrap();
+    assert_eq!(grown.solid_cells, 2_510);
+}
+
 /// Returns a map of scattered scans over many tiles.
 fn survey_map() -> InMemoryMapper {
     let mut map = InMemoryMapper::new(MapConfig::new(0.2, 2.0).unwrap().with_range(0.0, 30.0)).unwrap();

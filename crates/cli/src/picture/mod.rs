@@ -246,6 +246,9 @@ fn caption(args: &PictureArgs, drawn: &Drawn, marked: Option<u64>) -> String {
             let labels: Vec<_> = drawn.classes.iter().map(|(class, _)| class_label(*class)).collect();
             format!("; classes {}", labels.join(", "))
         }
+        (None, _) if drawn.cells_without_value == drawn.solid_cells && drawn.solid_cells > 0 => {
+            "; no value to show: the points of the scans had none".to_owned()
+        }
         (None, _) => String::new(),
         (Some([.., most]), _) if args.distance_slice.is_some() => {
             format!("; distance 0 m{dark} to {most} m")
@@ -269,6 +272,9 @@ fn caption(args: &PictureArgs, drawn: &Drawn, marked: Option<u64>) -> String {
     };
     let changes = if args.since.is_some() { "; blue appeared, orange vanished, grey unchanged" } else { "" };
     let moving = match (marked, drawn.moving_points.unwrap_or_default()) {
+        (None, _) if drawn.cells_without_value == drawn.solid_cells && drawn.solid_cells > 0 => {
+            "; no value to show: the points of the scans had none".to_owned()
+        }
         (None, _) => String::new(),
         (Some(0), _) => "; no point is marked as moving: `voxtile clean` marks them".to_owned(),
         (Some(marked), drawn) if marked == drawn => format!("; {} moving points", HumanCount(marked)),

@@ -50,6 +50,8 @@ pub(super) struct Known {
 /// Voxels along an edge of the squares whose distances are computed at a time.
 const SQUARE_VOXELS: i32 = 512;
 
+/// Share of the known cells that may be beyond each border of the picture: single rays would make the rest small.
+pub(super) const OUTSIDE: f64 = 0.005;
 /// Maximum number of tiles to read a second time for finer cells.
 const MAX_TILES_READ_TWICE: usize = 4096;
 
@@ -61,7 +63,7 @@ impl Collected {
         let done = Progress::new(tiles.len() as u64, progress);
         let mut known = None;
         if let Some(voxels) = collector.bounds(&tiles) {
-            known = collector.collect(&tiles, voxels, &done)?;
+            known = collector.collect(&tiles, voxels, collector.outside(), &done)?;
         }
         if let Some(found) = &known {
             let seen = found.frame.voxels_of(found.first, found.count);
@@ -69,7 +71,7 @@ impl Collected {
             if finer.voxels_a_cell < found.frame.voxels_a_cell && tiles.len() <= MAX_TILES_READ_TWICE {
                 drop(known.take());
                 done.all.fetch_add(tiles.len() as u64, Ordering::Relaxed);
-                known = collector.collect(&tiles, seen, &done)?;
+                known = collector.collect(&tiles, seen, 0.0, &done)?;
             }
         }
         Ok(Self {
@@ -107,7 +109,7 @@ impl Collected {
                 let field = map.distance_field(&Aabb { min, max }, options)?;
                 add_distances(&field, &frame, &cells);
             }
-            let seen = seen(&frame, &cells);
+            let seen = seen(&frame, &cells, 0.0);
             known = seen.map(|(first, count)| Known { frame, cells, first, count });
         }
         let max_distance_m = options.max_distance_m;
@@ -231,7 +233,20 @@ impl<'a> Collector<'a> {
         })
     }
 
-    fn collect(&self, tiles: &[TileIndex], voxels: VoxelBox, progress: &Progress) -> Result<Option<Known>> {
+    /// Returns the share of the known cells that may be beyond each border of the picture.
+    fn outside(&self) -> f64 {
+        let shows_all = self.picture.region.is_some() || matches!(self.source, Source::Two { .. });
+        if shows_all { 0.0 } else { OUTSIDE }
+    }
+
+    /// Reads the tiles into cells, and crops them to the known ones but a share.
+    fn collect(
+        &self,
+        tiles: &[TileIndex],
+        voxels: VoxelBox,
+        outside: f64,
+        progress: &Progress,
+    ) -> Result<Option<Known>> {
         let frame = Frame::new(self.picture.view, voxels, self.picture.most_px);
         let layer = match self.picture.color_by {
             ColorBy::Layer(layer) if matches!(self.source, Source::One(_)) => Some(layer),
@@ -242,7 +257,7 @@ impl<'a> Collector<'a> {
             Source::One(map) => self.add(map, tile, &frame, &cells),
             Source::Two { before, after } => self.add_difference(before, after, tile, &frame, &cells),
         })?;
-        let seen = seen(&frame, &cells);
+        let seen = seen(&frame, &cells, outside);
         Ok(seen.map(|(first, count)| Known { frame, cells, first, count }))
     }
 
@@ -333,15 +348,28 @@ impl<'a> Collector<'a> {
     }
 }
 
-/// Returns the first cell and the number of cells of the bounds of all known cells; `None` if there are none.
-pub(super) fn seen(frame: &Frame, cells: &Cells) -> Option<([usize; 2], [usize; 2])> {
-    let (mut low, mut high) = (frame.cells, [0; 2]);
-    for (place, cell) in cells.iter().enumerate() {
-        if cell.rank > Rank::Unknown {
-            let at = [place % frame.cells[0], place / frame.cells[0]];
-            low = std::array::from_fn(|k| low[k].min(at[k]));
-            high = std::array::from_fn(|k| high[k].max(at[k]));
-        }
+/// Returns the first cell and the number of cells of the bounds of the known cells, but a share of them beyond each
+/// border; `None` if there are none.
+pub(super) fn seen(frame: &Frame, cells: &Cells, outside: f64) -> Option<([usize; 2], [usize; 2])> {
+    let mut counts = frame.cells.map(|count| vec![0_u64; count]);
+    for (place, _) in cells.iter().enumerate().filter(|(_, cell)| cell.rank > Rank::Unknown) {
+        counts[0][place % frame.cells[0]] += 1;
+        counts[1][place / frame.cells[0]] += 1;
     }
-    (low[0] <= high[0]).then(|| (low, std::array::from_fn(|k| high[k] + 1 - low[k])))
+    let few = (counts[0].iter().sum::<u64>() as f64 * outside) as u64;
+    let [mut first, mut count] = [[0; 2]; 2];
+    for (k, counts) in counts.iter().enumerate() {
+        first[k] = first_beyond(counts.iter(), few)?;
+        count[k] = frame.cells[k] - first_beyond(counts.iter().rev(), few)? - first[k];
+    }
+    Some((first, count))
+}
+
+/// Returns the first place whose count, with those before, is above a number.
+pub(super) fn first_beyond<'a>(mut counts: impl Iterator<Item = &'a u64>, few: u64) -> Option<usize> {
+    let mut sum = 0;
+    counts.position(|count| {
+        sum += count;
+        sum > few
+    })
 }

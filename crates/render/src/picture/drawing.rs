@@ -155,7 +155,7 @@ impl<'a> Drawing<'a> {
         }
         let voxels = known.frame.voxels_of(first, cells);
         let corner_m = |voxel: [i32; 3]| voxel.map(|index| self.grid.corner_m(index));
-        let count = |from: Rank| known.cells.iter().filter(|cell| cell.rank >= from).count() as u64;
+        let count = |from: Rank| known.shown().filter(|(_, cell)| cell.rank >= from).count() as u64;
         Drawn {
             image: canvas.into_image(measure.dpi()),
             map_px: [pane.left, pane.top, size[0], size[1]],
@@ -180,7 +180,7 @@ impl<'a> Drawing<'a> {
         if self.collected.content != Content::Comparison {
             return Some(known);
         }
-        let (first, count) = seen(&known.frame, &known.cells)?;
+        let (first, count) = seen(&known.frame, &known.cells, 0.0)?;
         Some(Known { first, count, ..known })
     }
 
@@ -204,7 +204,7 @@ impl<'a> Drawing<'a> {
     fn counts(&self, known: &Known) -> (Vec<(u8, u64)>, u64) {
         let Some(layer) = &known.cells.layer else { return (Vec::new(), 0) };
         let (mut classes, mut without) = (BTreeMap::new(), 0);
-        for (place, _) in known.cells.iter().enumerate().filter(|(_, cell)| cell.rank == Rank::Occupied) {
+        for (place, _) in known.shown().filter(|(_, cell)| cell.rank == Rank::Occupied) {
             match layer.at(place) {
                 Some(LayerValue::Class(class)) => *classes.entry(class).or_default() += 1,
                 Some(_) => {}
@@ -241,13 +241,13 @@ impl<'a> Drawing<'a> {
             ColorBy::Count | ColorBy::LastScan => Rank::Free,
             ColorBy::Layer(_) => {
                 let layer = known.cells.layer.as_ref()?;
-                let cells = known.cells.iter().enumerate().filter(|(_, cell)| cell.rank == Rank::Occupied);
+                let cells = known.shown().filter(|(_, cell)| cell.rank == Rank::Occupied);
                 let values = cells.filter_map(|(place, _)| self.values().number_of(layer.at(place)?));
                 return self.values().range_of(values.collect());
             }
         };
-        let cells = known.cells.iter().filter(|cell| cell.rank >= least);
-        self.values().range_of(cells.map(|cell| f64::from(cell.value)).collect())
+        let cells = known.shown().filter(|(_, cell)| cell.rank >= least);
+        self.values().range_of(cells.map(|(_, cell)| f64::from(cell.value)).collect())
     }
 
     fn draw_cells(&self, canvas: &mut Canvas, known: &Known, pane: &Pane) {
@@ -344,6 +344,14 @@ impl<'a> Drawing<'a> {
 impl Known {
     fn place(&self, [across, up]: [usize; 2]) -> usize {
         across + up * self.frame.cells[0]
+    }
+
+    /// Returns the places and contents of the cells in the picture.
+    fn shown(&self) -> impl Iterator<Item = (usize, Cell)> {
+        let (first, count) = with_air(self);
+        let rows = first[1]..first[1] + count[1];
+        let places = rows.flat_map(move |up| (0..count[0]).map(move |k| self.place([first[0] + k, up])));
+        places.map(|place| (place, self.cells.at(place)))
     }
 
     fn cell(&self, at: [usize; 2]) -> Cell {

@@ -1,7 +1,8 @@
 use crate::Layer;
 use voxtile::space::VoxelIndex;
 
-/// Viewing direction.
+/// Viewing direction. Up to 0.5 % of the cells or voxels may be beyond each border of the picture of a map, unless a
+/// region is set.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[non_exhaustive]
 pub enum View {
@@ -18,7 +19,7 @@ pub enum View {
     /// From a side, z up.
     Side(SideAxis),
     /// From a direction between above and the side, with shades; lengths along the image have one scale. Only occupied
-    /// voxels are drawn. Up to 0.5 % of them may be beyond each border of the image, unless a region is set.
+    /// voxels are drawn.
     Oblique {
         /// Direction from the map to the viewer, counterclockwise from x, in degrees.
         azimuth_deg: f64,

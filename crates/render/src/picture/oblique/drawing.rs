@@ -1,5 +1,5 @@
 use super::super::canvas::Canvas;
-use super::super::collect::{Collector, Progress, Source};
+use super::super::collect::{Collector, OUTSIDE, Progress, Source};
 use super::super::drawing::{AXES, Drawn, nothing};
 use super::super::layer_cells::LayerValue;
 use super::super::layout::Layout;
@@ -24,8 +24,6 @@ use voxtile::mapper::{MapView, TileRef};
 use voxtile::space::{Aabb, TileIndex};
 use voxtile::{Result, Voxel};
 
-/// Share of the voxels at either end of the width and height that the image may cut off.
-const OUTSIDE: f64 = 0.005;
 /// Distance of the samples that are compared for shades, in points.
 const SHADE_PT: f64 = 0.4;
 /// Width of grid lines in points.

@@ -1,3 +1,4 @@
+use super::super::collect::first_beyond;
 use super::camera::Camera;
 use std::sync::atomic::{AtomicU64, Ordering};
 use voxtile::space::{VoxelBox, VoxelIndex};
@@ -71,15 +72,6 @@ impl Extent {
         let [right, up, _, x, y, z] = bounds;
         Some(Bounds { image: [right, up], map: [x, y, z] })
     }
-}
-
-/// Returns the first bin whose count, with those before, is above a number.
-fn first_beyond<'a>(mut counts: impl Iterator<Item = &'a u64>, few: u64) -> Option<usize> {
-    let mut sum = 0;
-    counts.position(|count| {
-        sum += count;
-        sum > few
-    })
 }
 
 /// Bounds of voxels, in voxels from the base.

@@ -49,7 +49,7 @@ pub struct Sample {
 const DEPTH_BITS: u32 = 29;
 const MAX_DEPTH: u64 = (1 << DEPTH_BITS) - 1;
 /// Face of small voxels.
-pub const NO_FACE: u8 = 3;
+const NO_FACE: u8 = 3;
 
 impl Frame {
     /// Returns the position of a point in samples, and its nearness in samples; the point is in voxels from the base.
@@ -163,15 +163,14 @@ impl Frame {
         let camera = &self.camera;
         let offset: [f64; 3] = std::array::from_fn(|k| right * camera.right[k] + up * camera.up[k]);
         let (mut exit, mut entry, mut face) = (f64::INFINITY, f64::NEG_INFINITY, 0);
-        for k in 0..3 {
-            let near = camera.near[k];
+        for (k, (offset, near)) in offset.into_iter().zip(camera.near).enumerate() {
             if near == 0.0 {
-                if offset[k].abs() > 0.5 {
+                if offset.abs() > 0.5 {
                     return None;
                 }
                 continue;
             }
-            let sides = [(-0.5 - offset[k]) / near, (0.5 - offset[k]) / near];
+            let sides = [(-0.5 - offset) / near, (0.5 - offset) / near];
             entry = entry.max(sides[0].min(sides[1]));
             if sides[0].max(sides[1]) < exit {
                 (exit, face) = (sides[0].max(sides[1]), k as u8);

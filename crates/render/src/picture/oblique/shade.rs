@@ -1,4 +1,4 @@
-use super::samples::{Frame, NO_FACE, Sample, Samples};
+use super::samples::{Frame, Sample, Samples};
 
 /// Brightness of the surfaces of an image: by face, darker behind steps in depth and at the rims of cubes.
 pub struct Shade {
@@ -23,14 +23,12 @@ const PAIRS: [[i64; 2]; 4] = [[1, 0], [0, 1], [1, 1], [1, -1]];
 impl Shade {
     /// Returns the shades for a distance of samples that is as wide as a line.
     pub fn new(frame: &Frame, radius: usize) -> Self {
-        let mut faces = [TOP, TOP, TOP, SMALL];
-        for k in 0..2 {
+        let side = |k: usize| {
             // To the right in the image is the side whose normal points to the right.
             let to_right = frame.camera.right[k] * frame.camera.near[k].signum();
-            let share = 0.5 * (1.0 + to_right);
-            faces[k] = SIDES[0] + share * (SIDES[1] - SIDES[0]);
-        }
-        faces[usize::from(NO_FACE)] = SMALL;
+            SIDES[0] + 0.5 * (1.0 + to_right) * (SIDES[1] - SIDES[0])
+        };
+        let faces = [side(0), side(1), TOP, SMALL];
         Self { faces, radii: [radius.max(1), 6 * radius.max(1)] }
     }
 
