@@ -69,8 +69,8 @@ fn columns_are_those_of_a_naive_count() {
 
 #[test]
 fn rooms_are_cut_and_the_open_is_not() {
-    assert_eq!([0.0, 0.3].map(|share| cut(share)), [None; 2]);
-    assert_eq!([0.8, 1.0].map(|share| cut(share)), [Some(1.1); 2]);
+    assert_eq!([0.0, 0.3].map(cut), [None; 2]);
+    assert_eq!([0.8, 1.0].map(cut), [Some(1.1); 2]);
     let (map, _) = corridor(1.0);
     assert_eq!(Roof::of(&map, &[]).unwrap(), None);
     assert_eq!(Roof::of(&map, &[[f64::NAN; 3], [1e300; 3]]).unwrap(), None);

@@ -103,6 +103,9 @@ pub struct ReportArgs {
     /// HTML file to write; - is standard output
     #[arg(short = 'o', long = "output", value_name = "FILE")]
     pub output: PathBuf,
+    /// Colors of heights [default: voxtile]
+    #[arg(long, value_name = "NAME", value_parser = color_map_names())]
+    pub color_map: Option<String>,
     #[arg(long, value_name = "Z|none", default_value = "auto", allow_hyphen_values = true, help = help::MAX_HEIGHT)]
     pub max_height: MaxHeight,
     /// Skip the check of every file for damage, which reads the whole map once more

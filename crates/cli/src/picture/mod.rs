@@ -147,6 +147,11 @@ impl From<BackgroundName> for Background {
     }
 }
 
+/// Returns the color map of a name, or the default.
+pub fn color_map_of(name: Option<&str>) -> &'static ColorMap {
+    name.and_then(ColorMap::named).unwrap_or_else(ColorMap::voxtile)
+}
+
 fn picture_of(args: &PictureArgs) -> Result<Picture> {
     if args.from == ViewName::Oblique && (args.moving || args.since.is_some()) {
         let reason = "the oblique view shows a single map, without --moving and --since";
@@ -171,13 +176,11 @@ fn picture_of(args: &PictureArgs) -> Result<Picture> {
     let mut picture = Picture::new().with_view(view).with_color(args.color.into()).with_size_px(size_px);
     picture = picture.with_grid(!args.no_grid).with_background(args.background.into());
     picture = picture.with_dpi(args.dpi.map(f64::from));
-    if let Some(color_map) = args.color_map.as_deref().and_then(ColorMap::named) {
-        if matches!(args.color, ColorName::Rgb | ColorName::Class) {
-            let reason = "--color rgb and --color class have their own colors; omit one of both";
-            return Err(Error::argument("--color-map", reason));
-        }
-        picture = picture.with_color_map(color_map);
+    if args.color_map.is_some() && matches!(args.color, ColorName::Rgb | ColorName::Class) {
+        let reason = "--color rgb and --color class have their own colors; omit one of both";
+        return Err(Error::argument("--color-map", reason));
     }
+    picture = picture.with_color_map(color_map_of(args.color_map.as_deref()));
     if let Some(region) = &args.region {
         picture = picture.with_region(region_of(region)?);
     }
@@ -238,9 +241,7 @@ fn caption(args: &PictureArgs, drawn: &Drawn, marked: Option<u64>) -> String {
         ViewName::SideY => [1, 2],
     };
     let [across, up] = axes.map(|axis| region.max[axis] - region.min[axis]);
-    let is_diverging =
-        args.color_map.as_deref().and_then(ColorMap::named).is_some_and(|map| map.is_diverging);
-    let dark = if is_diverging { "" } else { " (dark)" };
+    let dark = if color_map_of(args.color_map.as_deref()).is_diverging { "" } else { " (dark)" };
     let scale = match (drawn.range, args.color) {
         (None, ColorName::Class) if args.since.is_none() && !drawn.classes.is_empty() => {
             let labels: Vec<_> = drawn.classes.iter().map(|(class, _)| class_label(*class)).collect();

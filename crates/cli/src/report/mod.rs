@@ -7,7 +7,7 @@ use crate::args::ReportArgs;
 use crate::counted::Counted;
 use crate::info::Info;
 use crate::json;
-use crate::picture::{Ceiling, name_of, path_of};
+use crate::picture::{Ceiling, color_map_of, name_of, path_of};
 use crate::progress::Progress;
 use std::io::{self, Write};
 use std::path::Path;
@@ -21,7 +21,7 @@ use voxtile_pipeline::memory;
 use voxtile_pipeline::output::{OutputFile, is_standard_output};
 use voxtile_pipeline::place::place_of;
 use voxtile_pipeline::{AnyMap, MapAt, read_any_map};
-use voxtile_render::{ColorBy, Drawn, Layer, Picture, SideAxis, Survey, View};
+use voxtile_render::{ColorBy, ColorMap, Drawn, Layer, Picture, SideAxis, Survey, View};
 
 /// Content of the report.
 struct Report {
@@ -40,6 +40,7 @@ struct Content {
     above: Drawn,
     side: Drawn,
     ceiling: Ceiling,
+    color_map: &'static ColorMap,
     /// Pictures by the layers that the map has, with their captions.
     layers: Vec<(Drawn, &'static str)>,
     scans: std::result::Result<Vec<ScanRecord>, String>,
@@ -147,7 +148,8 @@ impl Content {
         let resolution_m = info.resolution_m;
         let trajectory = path_of(map);
         let ceiling = Ceiling::of(args.max_height, map, &trajectory, true)?;
-        let picture = Picture::new().with_path(trajectory).skipping_unreadable();
+        let color_map = color_map_of(args.color_map.as_deref());
+        let picture = Picture::new().with_path(trajectory).with_color_map(color_map).skipping_unreadable();
         let title = |what: &str| format!("{} {what}: {resolution_m} m voxels", name_of(path));
         let above_title = title("from above") + &ceiling.caption();
         let above = picture.clone().with_size_px(ABOVE_PX).with_title(above_title);
@@ -178,6 +180,7 @@ impl Content {
             scans: reader.scans().map_err(|error| format!("{error:#}")),
             sizes: Sizes::of(reader),
             ceiling,
+            color_map,
             info,
         })
     }

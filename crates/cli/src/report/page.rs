@@ -8,7 +8,7 @@ use indicatif::{HumanBytes, HumanCount};
 use std::io::{self, Write};
 use voxtile::store::ScanRecord;
 use voxtile_render::classes::class_label;
-use voxtile_render::{Survey, colors};
+use voxtile_render::{ColorMap, Survey, colors};
 
 const SECONDS_A_NS: f64 = 1e-9;
 
@@ -128,7 +128,7 @@ impl Content {
         write_picture(out, &self.side, "From the side.")?;
         self.write_numbers(out)?;
         write_classes(out, survey)?;
-        write_histograms(out, survey)?;
+        write_histograms(out, survey, self.color_map)?;
         self.sizes.write(out)
     }
 
@@ -209,7 +209,7 @@ fn write_scans(out: &mut impl Write, scans: &[ScanRecord]) -> io::Result<()> {
     Ok(())
 }
 
-fn write_histograms(out: &mut impl Write, survey: &Survey) -> io::Result<()> {
+fn write_histograms(out: &mut impl Write, survey: &Survey, color_map: &ColorMap) -> io::Result<()> {
     let bins = survey.probabilities.len();
     let bars: Vec<Bar> = (0..bins)
         .map(|bin| {
@@ -236,7 +236,7 @@ fn write_histograms(out: &mut impl Write, survey: &Survey) -> io::Result<()> {
             from: format!("{} m", hundredths(bin.from_m)),
             to: format!("{} m", hundredths(bin.to_m)),
             count: bin.occupied,
-            color: colors::color_of(number as f64 / most as f64),
+            color: color_map.color_of(number as f64 / most as f64),
         })
         .collect();
     if bars.is_empty() { Ok(()) } else { write_histogram(out, "Occupied voxels by height", &bars) }

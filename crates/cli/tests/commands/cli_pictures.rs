@@ -279,6 +279,13 @@ fn ceilings_of_rooms_are_cut() {
     };
     assert_eq!(report(&[]), (0.05.into(), true));
     assert_eq!(report(&["--max-height", "none"]), (Value::Null, false));
+    let highest = voxtile_render::ColorMap::named("cividis").unwrap().color_of(1.0);
+    let [red, green, blue] = highest;
+    let bar = format!("rgb({red},{green},{blue})");
+    let has_bar = || fs::read_to_string(&page).unwrap().contains(&bar);
+    assert!(!has_bar());
+    report(&["--color-map", "cividis"]);
+    assert!(has_bar(), "{bar}");
     let (code, error) = failure(&["picture", text(&room), "-o", text(&file), "--max-height", "high"]);
     assert!(code == 2 && error.contains("a height in metres"), "{error}");
 }
