@@ -29,9 +29,15 @@ impl Canvas {
 
     /// Blends a color over a box of pixels; `cover` is the opacity from 0 to 1.
     pub fn fill(&mut self, left: usize, top: usize, size: [usize; 2], color: Rgb, cover: f64) {
+        let columns = left.min(self.width)..left.saturating_add(size[0]).min(self.width);
+        let [red, green, blue] = color;
         for y in top.min(self.height)..top.saturating_add(size[1]).min(self.height) {
-            for x in left.min(self.width)..left.saturating_add(size[0]).min(self.width) {
-                self.blend(x + y * self.width, color, cover);
+            let row = y * self.width;
+            if cover >= 1.0 {
+                let pixels = &mut self.bytes[4 * (row + columns.start)..4 * (row + columns.end)];
+                pixels.as_chunks_mut().0.fill([red, green, blue, 255]);
+            } else {
+                columns.clone().for_each(|x| self.blend(x + row, color, cover));
             }
         }
     }
