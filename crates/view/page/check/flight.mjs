@@ -75,7 +75,7 @@ try {
     const high = next() < 0.5 ? 0 : 100 * next();
     await look([at[0], at[1], at[2] + high], 20 + high);
     await new Promise((resolve) => setTimeout(resolve, 100));
-    if (jump % 20 === 0) await browser.ready(120);
+    if (jump % 100 === 0) await browser.ready(120);
     if (jump % Math.ceil(Number(jumps) / 10) === 0) await memory(jump);
   }
   const times = [];
