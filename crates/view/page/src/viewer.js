@@ -145,7 +145,8 @@ export class Viewer {
   wakeSoon() {
     if (this.waits || this.timer) return;
     this.settled = false;
-    this.timer = setTimeout(() => this.wake(), Math.max(30, 3 * this.frameMs));
+    const isLoading = this.layers.some(({ tiles }) => !Layer.isIdle(tiles));
+    this.timer = setTimeout(() => this.wake(), isLoading ? Math.max(30, 2 * this.frameMs) : 30);
   }
 
   frame(now) {
