@@ -9,6 +9,7 @@ import { Browser } from './browser.mjs';
 import { checkChanges } from './changes.mjs';
 import { checkColours } from './colours.mjs';
 import { checkExported } from './exported.mjs';
+import { checkPeople } from './people.mjs';
 import { checkOpacity, checkTools } from './tools.mjs';
 
 const voxtile = process.env.VOXTILE;
@@ -168,6 +169,7 @@ checks: try {
     run('build', scan(0), '-o', map, '--resolution', '0.1', '-q');
     run('build', scan(7), '-o', map, '--append', '-q');
     step(await checkTools({ browser, view, map, run, exported, work }));
+    step(await checkPeople({ browser, url: await view(map) }));
     run('build', scan(1), '-o', join(work, 'other'), '--resolution', '0.1', '-q');
     await browser.open('about:blank');
     await browser.open(await view(map, join(work, 'other')));
@@ -433,6 +435,7 @@ checks: try {
   assert.deepEqual(browser.errors, []);
 
   step(await checkHands(map));
+  step(await checkPeople({ browser, url }));
   const running = server;
   step(await checkTools({ browser, view, map, run, exported, work }));
   server = running;

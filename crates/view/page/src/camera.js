@@ -10,6 +10,7 @@ export class Flight {
     this.orbit = new OrbitControls(camera, canvas);
     this.orbit.enableDamping = false;
     this.orbit.zoomToCursor = true;
+    this.orbit.listenToKeyEvents(canvas);
     this.orbit.addEventListener('change', wake);
     this.walks = false;
     this.keys = new Set();
@@ -25,6 +26,15 @@ export class Flight {
     });
     window.addEventListener('keyup', (event) => this.keys.delete(event.code));
     window.addEventListener('blur', () => this.keys.clear());
+  }
+
+  // Changes the distance to the point that the camera looks at by a factor.
+  zoom(factor) {
+    if (this.walks) return;
+    const { position } = this.camera;
+    position.sub(this.orbit.target).multiplyScalar(factor).add(this.orbit.target);
+    this.orbit.update();
+    this.wake();
   }
 
   walk(on) {

@@ -2,7 +2,7 @@
 
 import { app, comparison, viewer } from './app.js';
 import { paintDistances } from './distance_slice.js';
-import { $, json, metres, say, swatchOf } from './dom.js';
+import { $, json, metres, say, swatchOf, tell } from './dom.js';
 import { BY_LAYER, className, endsOf, joined, NO_VALUE } from './layers.js';
 import { RETRY_MS } from './live.js';
 import { allBounds, ceiling } from './maps.js';
@@ -152,7 +152,7 @@ export function paint() {
   viewer.colour = $('colour').value;
   viewer.threshold = Number($('threshold').value);
   const scale = viewer.layers[0]?.scale ?? { least: 0, most: 3.5 };
-  $('threshold-out').value = probabilityOf(logOddsOf(scale, viewer.threshold)).toFixed(3);
+  tell('threshold', probabilityOf(logOddsOf(scale, viewer.threshold)).toFixed(3));
   const isChange = viewer.layers.some(({ id }) => id.includes('~'));
   $('colours').hidden = comparison.isShown;
   const { domain, range, texts } = colourScale();
@@ -166,6 +166,7 @@ export function paint() {
   if (viewer.colour === 'above' && !reference.grid.isOfTrajectory) $('legend-name').textContent = 'Height above the ground';
   $('ramp-choice').hidden = isChange || ['rgb', 'class'].includes(viewer.colour);
   const ends = BY_LAYER[viewer.colour] ? paintLegend(range) : texts(range);
+  ['range-low', 'range-high'].forEach((id, k) => $(id).setAttribute('aria-valuetext', ends[k] ?? ''));
   if (isChange || !BY_LAYER[viewer.colour]) $('legend-classes').hidden = true;
   $('legend').hidden = isChange || ['rgb', 'class'].includes(viewer.colour) || (BY_LAYER[viewer.colour] && ends.length === 0);
   if (comparison.isShown) {

@@ -30,6 +30,8 @@ window.voxtile = {
     const nodes = viewer.layers.filter((layer) => layer.layerName).flatMap((layer) => layer.meshes().map(([mesh]) => mesh.userData.node));
     return nodes.every((node) => !name || node.values?.name === name) && app.legendNumber === app.legendShown ? viewer.colour : null;
   },
+  // What the view waits for.
+  waits: () => viewer.layers.map(({ tiles, adapts, next, waits }) => ({ ...tiles.stats, calm: tiles.calm, errorTarget: tiles.errorTarget, adapts, waits, hasNext: Boolean(next), shown: tiles.visibleTiles.size })),
   drawCalls: () => viewer.renderer.info.render.calls,
   mostDrawCalls: () => viewer.mostCalls,
   bytes: () => viewer.layers.reduce((sum, layer) => sum + layer.bytes, 0),

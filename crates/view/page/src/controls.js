@@ -5,6 +5,7 @@ import { colour, paint } from './colours.js';
 import { cut } from './cut.js';
 import { followCamera } from './distance_slice.js';
 import { $ } from './dom.js';
+import { showPanel } from './drawer.js';
 import { isBehind } from './live.js';
 import { allBounds, readCompared, showMaps, surround } from './maps.js';
 import { choose, removeMark } from './measure.js';
@@ -52,12 +53,6 @@ $('shot').addEventListener('click', () => {
 });
 
 $('help').addEventListener('click', () => $('keys').showModal());
-$('menu').addEventListener('click', () => showPanel($('panel').hidden));
-function showPanel(on) {
-  $('panel').hidden = !on;
-  $('menu').setAttribute('aria-expanded', String(on));
-}
-
 function theme(dark) {
   document.documentElement.classList.toggle('dark', dark);
   viewer.scene.background = null;
@@ -83,6 +78,8 @@ window.addEventListener('keydown', (event) => {
     return;
   }
   if (event.target.matches?.('input[type=number]')) return;
+  const zoom = { '+': 0.8, '=': 0.8, '-': 1.25 }[event.key];
+  if (zoom && !event.target.matches?.('input')) viewer.flight.zoom(zoom);
   const digit = /^Digit([1-9])$/.exec(event.code);
   if (digit && $('colour').options[digit[1] - 1]) {
     $('colour').selectedIndex = Number(digit[1]) - 1;
@@ -105,4 +102,3 @@ viewer.flight.orbit.addEventListener('change', followCamera);
 theme(scheme.matches);
 $('obstacle-swatch').style.background = `rgb(${OBSTACLE})`;
 $('moving-swatch').style.background = `rgb(${MOVING})`;
-if (matchMedia('(max-width: 700px)').matches) showPanel(false);

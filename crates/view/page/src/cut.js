@@ -3,7 +3,7 @@
 import { app, viewer } from './app.js';
 import { drawBox } from './box.js';
 import { layerHeight } from './distance_slice.js';
-import { $, metres, say } from './dom.js';
+import { $, metres, say, tell } from './dom.js';
 import { allBounds, ceiling } from './maps.js';
 import { drawSection } from './section.js';
 import { remember } from './view_link.js';
@@ -46,7 +46,7 @@ export function cut() {
       const at = ends[k][0] + (ends[k][1] - ends[k][0]) * input.value / 1000;
       const isOpen = end === '0' ? input.value === '0' : input.value === '1000';
       viewer.cut[side][k] = isOpen ? (end === '0' ? -Infinity : Infinity) : at;
-      $(`${axis}${end}-out`).value = isOpen ? 'all' : metres(at);
+      tell(axis + end, isOpen ? 'all' : metres(at));
     }
   });
   viewer.cut.high[2] = Math.min(viewer.cut.high[2], ceiling() ?? Infinity);

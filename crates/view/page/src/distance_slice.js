@@ -3,7 +3,7 @@
 import { app, viewer } from './app.js';
 import { cut } from './cut.js';
 import { coloursOf, readDistances } from './distances.js';
-import { $, metres, say } from './dom.js';
+import { $, metres, say, tell } from './dom.js';
 import { idOf } from './maps.js';
 
 // Request in progress.
@@ -34,7 +34,7 @@ export async function loadDistances() {
   }
   const [id, cap, z] = [idOf(app.maps[0]).split('~')[0], Number($('cap').value), layerHeight()];
   const around = [...viewer.toMap(viewer.flight.orbit.target.toArray()).slice(0, 2), z];
-  $('layer-out').value = metres(z);
+  tell('layer', metres(z));
   $('cap-out').textContent = `${cap} m or more`;
   $('distances-out').value = 'loading';
   const request = new AbortController();
@@ -65,7 +65,7 @@ export function paintDistances() {
 
 function loadDistancesSoon() {
   if (!$('distances').checked) return;
-  $('layer-out').value = metres(layerHeight());
+  tell('layer', metres(layerHeight()));
   clearTimeout(distancesTimer);
   distancesTimer = setTimeout(loadDistances, 200);
 }

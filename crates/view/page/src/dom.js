@@ -20,6 +20,12 @@ export function say(text) {
   if (text) messageTimer = setTimeout(() => say(''), 12000);
 }
 
+// Sets the text of a slider, also for screen readers.
+export function tell(id, text) {
+  $(`${id}-out`).value = text;
+  $(id).setAttribute('aria-valuetext', text);
+}
+
 export const swatchOf = (colour) => {
   const swatch = document.createElement('span');
   swatch.className = 'swatch';

@@ -1,5 +1,5 @@
 import * as THREE from 'three';
-import { FAILED, TilesRenderer } from '3d-tiles-renderer';
+import { FAILED, PriorityQueue, TilesRenderer } from '3d-tiles-renderer';
 import { contentOf, plain } from './content.js';
 import { BY_LAYER } from './layers.js';
 import { KIND, parseNode } from './node.js';
@@ -15,6 +15,19 @@ const MOST_NEAR = 24;
 // Failed requests are retried with increasing delay.
 const FIRST_RETRY_MS = 2000;
 const LAST_RETRY_MS = 60000;
+
+// Decodes nodes between frames. By default, the renderer decodes five in each frame, which takes a minute after a jump
+// where frames are slow.
+class DecodeQueue extends PriorityQueue {
+  scheduleJobRun() {
+    if (this.scheduled) return;
+    this.scheduled = true;
+    setTimeout(() => {
+      this.scheduled = false;
+      this.tryRunJobs();
+    });
+  }
+}
 
 // One state of a map; nodes are loaded and removed as the camera moves.
 export class Layer {
@@ -44,6 +57,8 @@ export class Layer {
     const tiles = new TilesRenderer(`maps/${this.id}/tileset.json`);
     const { legend } = this;
     tiles.layerName = legend && this.layerName;
+    const { priorityCallback } = tiles.parseQueue;
+    tiles.parseQueue = Object.assign(new DecodeQueue(), { priorityCallback });
     tiles.errorTarget = BEST_ERROR;
     tiles.registerPlugin({
       preprocessURL: (url) => {
@@ -71,7 +86,7 @@ export class Layer {
     tiles.setResolutionFromRenderer(this.viewer.camera, this.viewer.renderer);
     tiles.lost = new Set();
     tiles.addEventListener('load-error', ({ tile, error }) => this.lose(tiles, tile, error));
-    tiles.addEventListener('needs-update', () => this.viewer.wake());
+    tiles.addEventListener('needs-update', () => this.viewer.wakeSoon());
     this.group.add(tiles.group);
     return tiles;
   }

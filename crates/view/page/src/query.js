@@ -18,6 +18,7 @@ export function answer(rows) {
     return [dt, dd];
   }));
   $('card').hidden = rows.length === 0;
+  $('spoken').textContent = rows.map(([name, value]) => `${name} ${value.textContent ?? value}`).join(', ');
   if (!rows.length) return;
   // The card is next to the click, within the picture.
   const { left, top, width, height } = $('scene').getBoundingClientRect();
@@ -119,6 +120,12 @@ $('scene').addEventListener('pointerup', (event) => {
   const moved = pressed && Math.hypot(event.clientX - pressed[0], event.clientY - pressed[1]);
   if (pressed && moved < 5 && event.button === 0) clickAt(event.clientX, event.clientY);
   pressed = null;
+});
+
+$('scene').addEventListener('keydown', (event) => {
+  if (event.key !== 'Enter') return;
+  const { left, top, width, height } = $('scene').getBoundingClientRect();
+  clickAt(left + width / 2, top + height / 2);
 });
 
 export function clickAt(x, y) {

@@ -87,7 +87,9 @@ export function drawSection() {
   context.fillStyle = getComputedStyle(document.body).backgroundColor;
   context.fillRect(0, 0, w, h);
   const step = roundLength(1.5 * TICK_PX / scale);
-  const stepUp = roundLength(Math.min(TICK_PX / scale, Math.max(high - low, 1e-6)));
+  let stepUp = roundLength(Math.min(TICK_PX / scale, Math.max(high - low, 1e-6)));
+  // Texts do not overlap.
+  while (stepUp * scale < 16) stepUp *= 2;
   context.font = '11px system-ui, sans-serif';
   context.fillStyle = ink;
   context.strokeStyle = ink;

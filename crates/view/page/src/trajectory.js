@@ -1,7 +1,7 @@
 // Trajectory of the sensor.
 
 import { app, viewer } from './app.js';
-import { $, json, say } from './dom.js';
+import { $, json, say, tell } from './dom.js';
 import { timeText } from './layers.js';
 import { idOf } from './maps.js';
 
@@ -38,7 +38,7 @@ function showScan() {
   const on = $('path').checked;
   viewer.overlays.show('path', on);
   const time = times ? `, ${timeText(times[number], { range: [times[0]], isUnixTime })}` : '';
-  $('scan-out').value = app.path.length ? `${number + 1} of ${app.path.length}${time}` : 'none';
+  tell('scan', app.path.length ? `${number + 1} of ${app.path.length}${time}` : 'none');
   const size = 1.2 * (app.maps[0]?.resolution_m ?? 0.1);
   if (at && on) viewer.overlays.dot('sensor', at, Math.max(2 * size, 0.1), 0xff3b6b);
   else viewer.overlays.set('sensor', null);

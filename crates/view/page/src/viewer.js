@@ -9,6 +9,8 @@ import { OF_FIRST_MAP, Overlays } from './overlays.js';
 import { Shading } from './shading.js';
 
 const MOST_CALLS = 200;
+// Slower frames count as this long.
+const MOST_FRAME_MS = 400;
 // Draw calls reserved for overlays: trajectory, sensor, moving points, distances, marks, change, ground, grid, bounding box, section, cut box;
 // and for the shading.
 const OVERLAY_CALLS = 16;
@@ -53,6 +55,8 @@ export class Viewer {
     this.moves = [];
     this.firstPictureMs = null;
     this.frames = 0;
+    this.frameMs = 0;
+    this.timer = 0;
     this.mostCalls = 0;
     this.last = performance.now();
     new ResizeObserver(() => this.resize()).observe(canvas);
@@ -124,13 +128,28 @@ export class Viewer {
       this.settled = false;
       for (const listener of this.listeners) listener(this);
     }
+    clearTimeout(this.timer);
+    this.timer = 0;
     if (this.waits) return;
     this.waits = true;
-    requestAnimationFrame((now) => this.frame(now));
+    const since = performance.now();
+    requestAnimationFrame((now) => {
+      this.waits = false;
+      this.frame(now);
+      // Time of a frame with its wait for the drawing before it.
+      this.frameMs = Math.min(performance.now() - since, MOST_FRAME_MS);
+    });
+  }
+
+  // Requests a frame for nodes that were loaded. Where frames are slow, loading gets most of the time.
+  wakeSoon() {
+    if (this.waits || this.timer) return;
+    this.settled = false;
+    const isLoading = this.layers.some(({ tiles }) => !Layer.isIdle(tiles));
+    this.timer = setTimeout(() => this.wake(), isLoading ? Math.max(30, 2 * this.frameMs) : 30);
   }
 
   frame(now) {
-    this.waits = false;
     const seconds = (now - this.last) / 1000;
     this.last = now;
     const moved = this.flight.update(seconds);
@@ -154,7 +173,7 @@ export class Viewer {
     this.settled = isReady && this.wasReady && !moved;
     this.wasReady = isReady;
     for (const listener of this.listeners) listener(this);
-    if (!this.settled) this.waitAWhile(moved);
+    if (!this.settled) this[moved ? 'wake' : 'wakeSoon']();
   }
 
   // First column of pixels of the later state.
@@ -203,14 +222,6 @@ export class Viewer {
     this.camera.far = away + 1.5 * far + 10;
     this.camera.updateProjectionMatrix();
     this.camera.updateMatrixWorld();
-  }
-
-  waitAWhile(moved) {
-    if (this.waits) return;
-    this.waits = true;
-    const again = () => requestAnimationFrame((now) => this.frame(now));
-    if (moved) again();
-    else setTimeout(again, 30);
   }
 
   // Sets the heights above which colours show heights.
