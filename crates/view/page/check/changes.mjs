@@ -66,6 +66,7 @@ export async function checkChanges({ browser, view, run, exported, countPixels, 
   const listed = await browser.value('[...document.querySelectorAll("#changes button")].map(({ textContent }) => textContent)');
   assert.equal(listed.length, wanted.changes.length);
   assert.ok(listed[0].startsWith(`1 ${wanted.changes[0].kind} `), listed[0]);
+  assert.equal(await browser.value('document.getElementById("crop").hidden && document.getElementById("crop-line").hidden'), true, 'crop has one map');
   // A click shows the state in both maps.
   const center = wanted.changes.find(({ kind }) => kind === 'appeared').center_m;
   await browser.value(`voxtile.lookAt([0, 0, 0], ${JSON.stringify(center)})`);

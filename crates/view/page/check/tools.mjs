@@ -1,4 +1,5 @@
 import assert from 'node:assert/strict';
+import { execFileSync } from 'node:child_process';
 import { mkdirSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
 
@@ -76,8 +77,13 @@ export async function checkTools({ browser, view, map, run, exported, work }) {
   await drag(browser, face0, face0.map((k, axis) => k + 0.4 * (other[axis] - k)));
   await browser.ready();
   const face = Number(await browser.value('document.querySelector(`[aria-label="Maximum x of the box"]`).ariaValueNow'));
-  const [, region] = /--region (.*)$/.exec(await browser.value('document.getElementById("crop-line").textContent'));
+  const command = () => browser.value('document.getElementById("crop-line").textContent');
+  const [, region] = /--region (.*)$/.exec(await command());
   assert.ok(Math.abs(Number(region.split(' ')[3]) - face) < 0.006, `the face is at ${face} m, the region is ${region}`);
+  // The height of the distances is none of the command.
+  await press(browser, 'distances');
+  assert.ok((await command()).endsWith(`--region ${region}`), await command());
+  await press(browser, 'distances');
   const cropped = join(work, 'boxed');
   run('crop', map, '-o', cropped, '--region', ...region.split(' '), '-q');
   const left = exported(cropped).size;
@@ -90,7 +96,7 @@ export async function checkTools({ browser, view, map, run, exported, work }) {
   await browser.value('document.getElementById("uncut").click(); document.getElementById("box").click(); document.activeElement.blur()');
 
   // Scans at uneven times, which their names have.
-  const timed = join(work, 'timed');
+  const timed = join(work, "it's timed");
   mkdirSync(join(work, 'stamped'));
   const stamps = [0, 1, 3, 6].map((second) => 1317042272 + second);
   for (const stamp of stamps) writeFileSync(join(work, 'stamped', `${stamp}.000000.xyz`), '3 0 0\n3 0.5 0\n3 0 0.5\n');
@@ -100,6 +106,9 @@ export async function checkTools({ browser, view, map, run, exported, work }) {
   await browser.open(await view(timed));
   await browser.ready();
   assert.equal(await text(browser, 'scan-out'), '4 of 4, 2011-09-26 13:04:38');
+  // A shell runs the command, whatever the name of the map.
+  execFileSync('sh', ['-c', `${(await command()).replace('voxtile', '"$VOXTILE"')} -q`], { cwd: work });
+  assert.deepEqual(exported(`${timed}_part`), exported(timed));
   await browser.value(set('speed', 4));
   const since = Date.now();
   await press(browser, 'play');
@@ -110,6 +119,14 @@ export async function checkTools({ browser, view, map, run, exported, work }) {
   const seconds = (Date.now() - since) / 1000;
   const due = (stamps.at(-1) - stamps[0]) / 4;
   assert.ok(seconds > due - 0.1 && seconds < due + 1, `${seconds} s of ${due} s`);
+
+  // A failed request has a message.
+  await browser.value(`(() => {
+    const { fetch } = window;
+    window.fetch = (url, ...rest) => (String(url).includes('moving.bin') ? Promise.reject(new Error('no network')) : fetch(url, ...rest));
+  })()`);
+  await press(browser, 'moving');
+  await browser.until('document.getElementById("message").textContent === "Cannot load the moving points: no network"', 5);
 
   await browser.call('Input.dispatchKeyEvent', { type: 'keyDown', key: '?', code: 'Minus', modifiers: 8 });
   await browser.call('Input.dispatchKeyEvent', { type: 'keyUp', key: '?', code: 'Minus' });
@@ -136,11 +153,16 @@ export async function checkOpacity({ browser, countPixels }) {
   const [half] = await pixels();
   await opacity(1, 0.5);
   const both = await pixels();
+  await opacity(0, 0);
+  await opacity(1, 0);
+  const { count } = await browser.value('voxtile.voxels()');
+  const clicked = await browser.value('voxtile.clickAt(...voxtile.screenOf([0, 1.5, 0]))');
   await opacity(0, 1);
   await opacity(1, 1);
   await press(browser, 'path');
   assert.ok(all > 5000 && none < 0.01 * all, `${all} and ${none} pixels`);
   assert.ok(half < 0.8 * all && both[1] > 1000 && both[0] > 1000, `${half}, ${both} of ${all} pixels`);
+  assert.deepEqual([count, clicked ?? null], [0, null], 'invisible maps have no voxels to click');
   assert.deepEqual(browser.errors, []);
   return `opacity of two maps: ${all}, ${half}, ${both} pixels`;
 }

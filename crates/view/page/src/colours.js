@@ -97,7 +97,7 @@ function aboveOf() {
   const isNew = reference?.key !== key;
   if (isNew) reference = { key, added: new WeakSet(), places: [], grid: new Reference(bounds, app.path, Math.min(...app.maps.map((map) => map.resolution_m))) };
   const { grid, added, places } = reference;
-  const nodes = viewer.layers.filter((layer) => layer.isShown).flatMap((layer) => layer.meshes().map(([mesh]) => mesh.userData.node)).filter((node) => !added.has(node));
+  const nodes = viewer.layers.filter((layer) => layer.isDrawn).flatMap((layer) => layer.meshes().map(([mesh]) => mesh.userData.node)).filter((node) => !added.has(node));
   if (isNew || (nodes.length && (places.length === 0 || !grid.isOfTrajectory))) {
     for (const node of nodes) {
       if (!grid.isOfTrajectory) grid.add(node);

@@ -1,6 +1,6 @@
 // Cuts along the axes.
 
-import { app, viewer } from './app.js';
+import { app, comparison, viewer } from './app.js';
 import { drawBox } from './box.js';
 import { layerHeight } from './distance_slice.js';
 import { $, metres, say, tell } from './dom.js';
@@ -11,6 +11,9 @@ import { remember } from './view_link.js';
 // Sliders of the cut, and their positions without a cut.
 export const CUTS = ['x0', 'x1', 'y0', 'y1', 'z0', 'z1'];
 export const OPEN = ['0', '1000', '0', '1000', '0', '1000'];
+
+// Ends of the cut that the sliders have: without the ceiling, and without the height of the distances.
+const sliders = { low: [-Infinity, -Infinity, -Infinity], high: [Infinity, Infinity, Infinity] };
 
 // Returns the ends of the sliders along each axis, in metres.
 export function endsOfCut() {
@@ -30,12 +33,15 @@ export function moveCut(axis, end, at) {
   cut();
 }
 
-// Returns the command that crops the map to the cut.
+// Quotes a text as one word of a shell.
+const quoted = (text) => `'${text.replaceAll("'", "'\\''")}'`;
+
+// Returns the command that crops the map to the sliders' box.
 function command() {
   const bounds = allBounds();
-  const end = (side, name) => viewer.cut[side].map((k, axis) => +(Number.isFinite(k) ? k : bounds[name][axis]).toFixed(3));
+  const end = (side, name) => sliders[side].map((k, axis) => +(Number.isFinite(k) ? k : bounds[name][axis]).toFixed(3));
   const { name } = app.maps[0];
-  return `voxtile crop ${name} -o ${name}_part --region ${end('low', 'min').join(' ')} ${end('high', 'max').join(' ')}`;
+  return `voxtile crop ${quoted(name)} -o ${quoted(`${name}_part`)} --region ${end('low', 'min').join(' ')} ${end('high', 'max').join(' ')}`;
 }
 
 export function cut() {
@@ -45,13 +51,17 @@ export function cut() {
       const input = $(axis + end);
       const at = ends[k][0] + (ends[k][1] - ends[k][0]) * input.value / 1000;
       const isOpen = end === '0' ? input.value === '0' : input.value === '1000';
-      viewer.cut[side][k] = isOpen ? (end === '0' ? -Infinity : Infinity) : at;
+      sliders[side][k] = isOpen ? (end === '0' ? -Infinity : Infinity) : at;
       tell(axis + end, isOpen ? 'all' : metres(at));
     }
   });
+  viewer.cut.low = [...sliders.low];
+  viewer.cut.high = [...sliders.high];
   viewer.cut.high[2] = Math.min(viewer.cut.high[2], ceiling() ?? Infinity);
   // Voxels above the distances would hide them.
   if ($('distances').checked) viewer.cut.high[2] = Math.min(viewer.cut.high[2], layerHeight() + 0.25 * app.maps[0].resolution_m);
+  // The command crops one map.
+  $('crop').hidden = $('crop-line').hidden = comparison.info !== null;
   $('crop-line').textContent = command();
   drawBox();
   drawSection();
@@ -65,7 +75,7 @@ $('uncut').addEventListener('click', () => {
   cut();
 });
 
-// Copies the command that crops the map to the cut.
+// Copies the command that crops the map to the sliders' box.
 $('crop').addEventListener('click', () => {
   const text = command();
   navigator.clipboard?.writeText(text).catch(() => {});

@@ -223,6 +223,11 @@ export class Layer {
     return tiles.calm > (tiles.visibleTiles.size > 0 || isEmpty ? 2 : 20);
   }
 
+  // Whether occupied voxels of the layer are visible.
+  get isDrawn() {
+    return this.isShown && this.opacity > 0;
+  }
+
   // Returns whether everything in view is loaded.
   get isReady() {
     return Layer.isQuiet(this.tiles) && !this.adapts && !this.next && !this.waits;

@@ -9,7 +9,7 @@ export function readLink() {
     return list?.length === count && list.every(Number.isFinite) ? list : null;
   };
   return { eye: numbers('eye', 3), to: numbers('to', 3), colour: fields.get('colour'), ramp: fields.get('ramp'), at: fields.get('at'), since: fields.get('since'),
-    threshold: fields.has('threshold') ? Number(fields.get('threshold')) : null, cut: numbers('cut', 6),
+    threshold: numbers('threshold', 1)?.[0] ?? null, cut: numbers('cut', 6),
     distances: numbers('distances', 2), compared: fields.get('compared'), line: numbers('line', 1) };
 }
 

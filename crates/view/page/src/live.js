@@ -62,7 +62,8 @@ async function change() {
   }
   cut();
   paint();
-  readPath();
+  // The ceiling depends on the trajectory.
+  readPath().then(cut);
   loadMoving();
   loadDistances();
 }

@@ -30,7 +30,7 @@ export async function loadMoving() {
   } catch (error) {
     if (number !== movingNumber) return;
     if (!app.moving) $('moving-out').value = 'not loaded';
-    say(`Cannot load the app.moving points: ${error.message}`);
+    say(`Cannot load the moving points: ${error.message}`);
     return;
   }
   // Ignore the response to an older request.

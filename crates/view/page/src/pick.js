@@ -38,7 +38,7 @@ export function pick(viewer, x, y) {
   caster.setFromCamera(new THREE.Vector2(x, y), viewer.camera);
   ray.copy(caster.ray);
   let best = null;
-  for (const layer of viewer.layers.filter((layer) => layer.isShown && viewer.isAt(layer, x))) {
+  for (const layer of viewer.layers.filter((layer) => layer.isDrawn && viewer.isAt(layer, x))) {
     for (const [mesh] of layer.meshes()) {
       const inverse = mesh.matrixWorld.clone().invert();
       local.copy(ray).applyMatrix4(inverse);

@@ -6,6 +6,8 @@ import * as THREE from 'three';
 const MOST_CELLS = 192;
 // Maximum width of buildings, in metres.
 const NARROW_M = 40;
+// Longer steps than this many usual ones are jumps, such as the start of another recording.
+const JUMP_STEPS = 8;
 
 // Fills cells without a height from the nearest ones with one.
 function spread(heights, width) {
@@ -53,10 +55,13 @@ export class Reference {
     // Heights that are known, and the voxels' edge that they are known to.
     this.known = new Float64Array(this.width * this.height).fill(NaN);
     this.edges = new Float64Array(this.width * this.height).fill(Infinity);
+    const lengths = path.map((at, k) => (k ? Math.hypot(at[0] - path[k - 1][0], at[1] - path[k - 1][1]) : 0));
+    const sorted = Float64Array.from(lengths.slice(1)).sort();
+    const longest = JUMP_STEPS * Math.max(sorted[Math.floor(sorted.length / 2)] ?? 0, 2 * this.cell);
     path.forEach((at, k) => {
-      // Cells between positions, too.
+      // Cells between positions, too, except across jumps.
       const before = path[Math.max(k - 1, 0)];
-      const steps = Math.ceil(Math.hypot(at[0] - before[0], at[1] - before[1]) / this.cell) + 1;
+      const steps = lengths[k] > longest ? 1 : Math.min(Math.ceil(lengths[k] / this.cell) + 1, 2 * (this.width + this.height));
       for (let step = 1; step <= steps; step++) {
         const cell = this.cellOf(at.map((value, axis) => before[axis] + (value - before[axis]) * step / steps));
         if (cell !== null) this.known[cell] = before[2] + (at[2] - before[2]) * step / steps;

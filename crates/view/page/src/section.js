@@ -33,7 +33,7 @@ function voxelsOf({ from, to }, width) {
   const length = Math.hypot(...way);
   const [dx, dy] = length > 0 ? way.map((k) => k / length) : [1, 0];
   const found = [];
-  for (const layer of viewer.layers.filter((one) => one.isShown)) {
+  for (const layer of viewer.layers.filter((one) => one.isDrawn)) {
     for (const [mesh] of layer.meshes()) {
       const { node } = mesh.userData;
       const { x, y, z, corner, edge, count } = node;
@@ -120,7 +120,10 @@ export function drawSection() {
 // Returns what the plot shows; for tests.
 export const sectionShown = () => shown;
 
-$('section-width').addEventListener('input', drawSection);
+$('section-width').addEventListener('input', () => {
+  drawSection();
+  viewer.wake();
+});
 $('section-save').addEventListener('click', () => {
   const a = Object.assign(document.createElement('a'), { href: $('section-plot').toDataURL(), download: `${app.maps[0].name}_section.png` });
   a.click();

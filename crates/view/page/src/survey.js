@@ -11,6 +11,8 @@ const ROOFED = 0.6;
 const KEPT = 0.3;
 // Maximum height of a ceiling above the sensor, in metres.
 const CEILING_M = 20;
+// Maximum spread of the sensor's heights on one storey, in metres.
+const MOST_SPREAD_M = 2;
 
 const share = (sorted, at) => sorted[Math.min(Math.floor(at * sorted.length), sorted.length - 1)];
 
@@ -70,9 +72,9 @@ export function ceilingOf({ edge, along }, path) {
   const step = Math.max(Math.floor(path.length / 500), 1);
   const places = path.filter((_, k) => k % step === 0);
   const sensors = places.map((place) => place[2]);
-  const lowest = Math.min(...sensors);
   // Above several storeys, one cut would leave out the rooms of some.
-  if (Math.max(...sensors) - lowest > 2) return null;
+  const [lowest, highest] = path.reduce(([low, high], [, , z]) => [Math.min(low, z), Math.max(high, z)], [Infinity, -Infinity]);
+  if (highest - lowest > MOST_SPREAD_M) return null;
   const ceilings = places.flatMap(([x, y, z]) => {
     const above = columns.get(key(x, y)) ?? [];
     // A place without a floor is not in a room: perhaps z is not up.

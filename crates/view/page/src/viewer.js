@@ -251,9 +251,9 @@ export class Viewer {
     }
   }
 
-  // Returns whether a voxel is drawn: above the threshold and within the cut.
+  // Returns whether a voxel is drawn: of a visible layer, above the threshold and within the cut.
   isSeen(layer, node, voxel, at) {
-    if (!this.shows.occupied) return false;
+    if (!layer.isDrawn || !this.shows.occupied) return false;
     if (node.kind === KIND.occupied && node.value[voxel] < this.threshold) return false;
     if (node.kind === KIND.compared && (node.value[voxel] & this.classes) === 0) return false;
     return at.every((k, axis) => {
