@@ -52,7 +52,6 @@ fn export(args: &ViewArgs, folder: &Path) -> anyhow::Result<ExitCode> {
         output: folder.to_owned(),
         finest: args.finest,
         region: args.region.as_deref().map(region_of).transpose()?,
-        keeps_levels: !args.no_cache,
     };
     let summary = export_page(&options, &watch)?;
     for reason in &summary.unreadable {
@@ -72,8 +71,15 @@ fn export(args: &ViewArgs, folder: &Path) -> anyhow::Result<ExitCode> {
         HumanCount(summary.files),
         HumanBytes(summary.bytes)
     )?;
-    writeln!(out, "to serve  python3 -m http.server -d {}", summary.output.display())?;
+    writeln!(out, "to serve  python3 -m http.server -d {}", quoted(&summary.output))?;
     Ok(ExitCode::SUCCESS)
+}
+
+/// Returns a path as a word for a shell.
+fn quoted(path: &Path) -> String {
+    let text = path.display().to_string();
+    let is_plain = text.chars().all(|letter| letter.is_alphanumeric() || "/._-+".contains(letter));
+    if is_plain { text } else { format!("'{}'", text.replace('\'', r"'\''")) }
 }
 
 /// Returns a progress callback that shows a bar, made for a number of parts.

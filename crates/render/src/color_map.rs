@@ -11,7 +11,7 @@ use std::sync::LazyLock;
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 #[non_exhaustive]
 pub struct ColorMap {
-    /// Name, as in `picture --colors`.
+    /// Name, as in `picture --color-map`.
     pub name: &'static str,
     /// What the map is good for, in a few words.
     pub purpose: &'static str,

@@ -15,6 +15,8 @@ pub struct Roof {
     pub roofed: u64,
     /// Median height of the sensor in metres.
     pub sensor_m: f64,
+    /// Difference between its highest and lowest position, in metres.
+    pub spread_m: f64,
 }
 
 /// Maximum number of columns of tiles that are read, evenly along the trajectory.
@@ -25,6 +27,8 @@ const MAX_ABOVE_M: f64 = 20.0;
 const COLUMN_M: f64 = 0.5;
 /// Share of roofed columns from which on the map is of rooms.
 const ROOM_SHARE: f64 = 0.55;
+/// Heights of a sensor that stays on one floor differ by less. One cut would hide the upper storeys of others.
+const MAX_SPREAD_M: f64 = 2.0;
 
 impl Roof {
     /// Counts the columns around a trajectory; `None` without a position. Reads up to 32 columns of tiles; unreadable tiles
@@ -40,7 +44,9 @@ impl Roof {
             let [x, y, _] = grid.tile_of_voxel(voxel).to_array();
             visited.entry([x, y]).or_default().push(place[2]);
         }
-        let heights = visited.values().flatten().copied().collect();
+        let heights: Vec<f64> = visited.values().flatten().copied().collect();
+        let highest = heights.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        let spread_m = highest - heights.iter().copied().fold(f64::INFINITY, f64::min);
         let Some(sensor_m) = median(heights) else { return Ok(None) };
         let stacks: Vec<([i32; 2], f64)> =
             visited.into_iter().filter_map(|(at, heights)| Some((at, median(heights)?))).collect();
@@ -55,7 +61,7 @@ impl Roof {
             .par_iter()
             .map(|(at, height_m)| count(map, tiles.get(at).map_or(&[], Vec::as_slice), *height_m));
         let [columns, roofed] = counts.try_reduce(|| [0; 2], |a, b| Ok([a[0] + b[0], a[1] + b[1]]))?;
-        Ok(Some(Self { columns, roofed, sensor_m }))
+        Ok(Some(Self { columns, roofed, sensor_m, spread_m }))
     }
 
     /// Share of roofed columns, 0 to 1.
@@ -64,9 +70,11 @@ impl Roof {
     }
 
     /// Returns the height in metres at which pictures of rooms cut the ceiling, that of the sensor; `None` if less than 55 %
-    /// of the columns are roofed. Measured: rooms have 70 to 99 %, streets and campuses 1 to 39 %.
+    /// of the columns are roofed, or if the sensor's heights differ by more than 2 m (several storeys, ramps). Measured:
+    /// rooms have 70 to 99 %, streets and campuses 1 to 39 %.
     pub fn cut_m(&self) -> Option<f64> {
-        (self.columns > 0 && self.share() >= ROOM_SHARE).then_some(self.sensor_m)
+        let is_room = self.columns > 0 && self.share() >= ROOM_SHARE && self.spread_m <= MAX_SPREAD_M;
+        is_room.then_some(self.sensor_m)
     }
 }
 

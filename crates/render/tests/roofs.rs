@@ -71,7 +71,10 @@ fn columns_are_those_of_a_naive_count() {
 fn rooms_are_cut_and_the_open_is_not() {
     assert_eq!([0.0, 0.3].map(cut), [None; 2]);
     assert_eq!([0.8, 1.0].map(cut), [Some(1.1); 2]);
-    let (map, _) = corridor(1.0);
+    let (map, mut path) = corridor(1.0);
+    // A scan from another storey: a cut would hide what it saw.
+    path.push([0.0, 0.0, 5.1]);
+    assert_eq!(Roof::of(&map, &path).unwrap().unwrap().cut_m(), None);
     assert_eq!(Roof::of(&map, &[]).unwrap(), None);
     assert_eq!(Roof::of(&map, &[[f64::NAN; 3], [1e300; 3]]).unwrap(), None);
     let far = Roof::of(&map, &[[500.0, 500.0, 1.0]]).unwrap().unwrap();

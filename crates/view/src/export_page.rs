@@ -35,8 +35,6 @@ pub struct PageOptions {
     pub finest: u8,
     /// Tiles with their center in this box, in metres; `None` for all.
     pub region: Option<Aabb>,
-    /// Whether coarse levels are stored in the user's cache folder for the next time.
-    pub keeps_levels: bool,
 }
 
 /// Content of an exported page.
@@ -64,7 +62,7 @@ pub struct PageSummary {
 /// Fails if the output exists and is not an empty folder, if a map cannot be read, if the region contains no center of a
 /// tile, or if a file cannot be written.
 pub fn export_page(options: &PageOptions, watch: &Watch) -> anyhow::Result<PageSummary> {
-    let staged = StagedOutput::beside(&options.output)?;
+    let staged = StagedOutput::folder_beside(&options.output)?;
     let folder = Folder { path: staged.path()?, files: AtomicU64::new(0), bytes: AtomicU64::new(0) };
     for file in page::files() {
         folder.write(file.name, &file.plain)?;
@@ -151,7 +149,7 @@ impl MapFolder<'_> {
         let region = options.region.map(|region| tiles_of(&region, &map.config().grid)).transpose()?;
         let mut tiles = map.tile_indices();
         tiles.retain(|tile| region.is_none_or(|region| region.contains(*tile)));
-        let (store, levels) = self.levels(&tiles, options.keeps_levels)?;
+        let (store, levels) = self.levels(&tiles)?;
         let all = LevelsOf { levels: &levels, map };
         let nodes = FromLevel::new(&all, options.finest);
         let root = tileset(&nodes, &store, TilesetContent::Voxels, json!({ "generation": 1 }))?;
@@ -177,12 +175,9 @@ impl MapFolder<'_> {
         Ok(WrittenMap { description, finest, tiles: tiles.len() as u64, nodes: count, unreadable })
     }
 
-    fn levels(&self, tiles: &[TileIndex], keeps_levels: bool) -> Result<(NodeStore, Levels)> {
-        let id = match self.map {
-            AnyMap::Map(map) => map.metadata().ext.as_ref().map(|ext| ext.map_id.clone()),
-            AnyMap::Octree(_) => None,
-        };
-        let store = node_cache::open(id.as_deref().filter(|_| keeps_levels))?;
+    fn levels(&self, tiles: &[TileIndex]) -> Result<(NodeStore, Levels)> {
+        // Not the user's cache: every tile is read, so that damaged ones are found.
+        let store = node_cache::open(None)?;
         let bar = self.watch.over_tiles(tiles.len());
         let read = AtomicU64::new(0);
         let step = |more: u64| {

@@ -129,7 +129,7 @@ def plot(
     ``color`` is ``"height"`` in metres, or a layer of the map: ``"rgb"``, ``"intensity"``, ``"class"``, or ``"age"`` (the
     time of the last hit). ``color_map`` has the colors of values: a name of ``voxtile picture --color-map``, or one of
     matplotlib. Only voxels below ``max_height`` in metres are drawn; ``"auto"`` cuts the ceiling of rooms, at the height of
-    the sensor, if most columns around the trajectory are roofed. ``region`` is a box, lower and upper corner; ``ax`` are
+    the sensor, if most columns around the trajectory are roofed and there is no ``region``. ``region`` is a box, lower and upper corner; ``ax`` are
     axes to draw into. Needs matplotlib. Returns the figure. A notebook shows it as the result of a cell, or with
     ``display``; in a program, ``savefig`` writes it.
     """
@@ -145,7 +145,10 @@ def plot(
     if isinstance(max_height, str) and max_height != "auto":
         raise ValueError(f"max_height: {max_height!r} is not auto, None, or a height in metres")
     colors_of_values = _color_map(color_map)
-    cut = map._ceiling() if isinstance(max_height, str) else max_height
+    if isinstance(max_height, str):
+        cut = map._ceiling() if region is None else None
+    else:
+        cut = max_height
     columns = _Columns(map, region, min_probability, _MOST_PIXELS, cut)
     figure = NewFigure(figsize=(8, 6)) if ax is None else ax.figure
     axes = figure.add_subplot() if ax is None else ax

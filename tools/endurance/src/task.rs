@@ -115,8 +115,9 @@ fn run_in_child<T: DeserializeOwned>(task: &Task) -> Result<T> {
         _ => Command::new(program),
     };
     command.arg(TASK_ARGUMENT).env("MALLOC_ARENA_MAX", "1");
-    let mut child =
-        command.stdin(Stdio::piped()).stdout(Stdio::piped()).spawn().context("cannot start a process")?;
+    let cannot = || format!("cannot start {}", command.get_program().display());
+    let cannot = cannot();
+    let mut child = command.stdin(Stdio::piped()).stdout(Stdio::piped()).spawn().context(cannot)?;
     if let Some(mut stdin) = child.stdin.take() {
         // A child that has already ended prints the reason itself.
         let _ = stdin.write_all(&serde_json::to_vec(task)?);

@@ -15,12 +15,12 @@ pub struct PictureArgs {
     /// Viewing direction
     #[arg(long, value_name = "VIEW", default_value = "above")]
     pub from: ViewName,
-    /// Oblique view: direction from the map to the viewer, counterclockwise from x, in degrees
-    #[arg(long, value_name = "DEGREES", default_value_t = -60.0)]
-    pub azimuth: f64,
-    /// Oblique view: angle of the viewer above the horizon, 0 to 90 degrees
-    #[arg(long, value_name = "DEGREES", default_value_t = 40.0)]
-    pub elevation: f64,
+    /// With --from oblique: direction from the map to the viewer, counterclockwise from x, in degrees [default: -60]
+    #[arg(long, value_name = "DEGREES")]
+    pub azimuth: Option<f64>,
+    /// With --from oblique: angle of the viewer above the horizon, 0 to 90 degrees [default: 40]
+    #[arg(long, value_name = "DEGREES")]
+    pub elevation: Option<f64>,
     /// Draw only the layer at this height from above, in metres
     #[arg(long, value_name = "Z")]
     pub slice: Option<f64>,
@@ -45,13 +45,13 @@ pub struct PictureArgs {
     /// Maximum length of the map's longer edge, in pixels, 16 to 16384
     #[arg(long, value_name = "PIXELS", default_value = "2048", value_parser = clap::value_parser!(u16).range(16..=16384))]
     pub size: u16,
-    /// Resolution in pixels per inch, 10 to 10000: type and lines have the size of print [default: that of a picture 17
+    /// Resolution in pixels per inch, 10 to 2400: type and lines have the size of print [default: that of a picture 17
     /// cm wide]
-    #[arg(long, value_name = "DPI", value_parser = clap::value_parser!(u16).range(10..=10_000))]
+    #[arg(long, value_name = "DPI", value_parser = clap::value_parser!(u16).range(10..=2_400))]
     pub dpi: Option<u16>,
     #[arg(long, value_name = "COLOR", default_value = "dark", help = "Color of unknown space and margins")]
     pub background: BackgroundName,
-    /// Draw no tile borders
+    /// Draw no borders of tiles; in the oblique view, no ground grid
     #[arg(long)]
     pub no_grid: bool,
     /// Draw no trajectory
@@ -70,6 +70,16 @@ pub struct PictureArgs {
 /// Names and purposes of all color maps.
 fn color_map_names() -> PossibleValuesParser {
     ColorMap::all().iter().map(|map| PossibleValue::new(map.name).help(map.purpose)).into()
+}
+
+impl PictureArgs {
+    pub fn azimuth_deg(&self) -> f64 {
+        self.azimuth.unwrap_or(-60.0)
+    }
+
+    pub fn elevation_deg(&self) -> f64 {
+        self.elevation.unwrap_or(40.0)
+    }
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -92,7 +102,7 @@ pub enum BackgroundName {
     Black,
     /// White, for print
     White,
-    /// None, with the dark type of white
+    /// No background; dark type, as on white
     Transparent,
 }
 

@@ -52,8 +52,8 @@ impl DrawnJson {
         Self {
             file: file.display().to_string(),
             from: view_name(args.from),
-            azimuth_deg: is_oblique.then_some(args.azimuth),
-            elevation_deg: is_oblique.then_some(args.elevation),
+            azimuth_deg: is_oblique.then(|| args.azimuth_deg()),
+            elevation_deg: is_oblique.then(|| args.elevation_deg()),
             slice_m: args.slice.or(args.distance_slice),
             color: match args.distance_slice {
                 Some(_) => Some("distance".to_owned()),

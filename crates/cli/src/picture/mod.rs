@@ -157,19 +157,22 @@ fn picture_of(args: &PictureArgs) -> Result<Picture> {
         let reason = "the oblique view shows a single map, without --moving and --since";
         return Err(Error::argument("--from", reason));
     }
+    if args.from != ViewName::Oblique
+        && let Some(option) = args.azimuth.map(|_| "--azimuth").or(args.elevation.map(|_| "--elevation"))
+    {
+        return Err(Error::argument(option, "needs --from oblique"));
+    }
     let view = match (args.slice.or(args.distance_slice), args.from) {
         (Some(z_m), ViewName::Above) => View::Slice { z_m, thickness_m: args.thickness.unwrap_or(0.0) },
         (Some(_), _) => {
-            return Err(Error::argument(
-                "--slice",
-                "needs the view from above; omit --from, or use --region",
-            ));
+            let option = if args.slice.is_some() { "--slice" } else { "--distance-slice" };
+            return Err(Error::argument(option, "needs the view from above; omit --from, or use --region"));
         }
         (None, ViewName::Above) => View::Above,
         (None, ViewName::SideX) => View::Side(SideAxis::X),
         (None, ViewName::SideY) => View::Side(SideAxis::Y),
         (None, ViewName::Oblique) => {
-            View::Oblique { azimuth_deg: args.azimuth, elevation_deg: args.elevation }
+            View::Oblique { azimuth_deg: args.azimuth_deg(), elevation_deg: args.elevation_deg() }
         }
     };
     let size_px = [usize::from(args.size); 2];
@@ -191,8 +194,10 @@ fn picture_of(args: &PictureArgs) -> Result<Picture> {
 fn complete(picture: &Picture, args: &PictureArgs, map: &AnyMap) -> Result<Picture> {
     let path = path_of(map);
     let is_layer = args.slice.or(args.distance_slice).is_some();
-    let is_from_above = matches!(args.from, ViewName::Above | ViewName::Oblique) && !is_layer;
-    let ceiling = Ceiling::of(args.max_height, map, &path, is_from_above)?;
+    // Changes cover what has not changed, and a region names its own height.
+    let is_whole = !is_layer && args.since.is_none() && args.region.is_none();
+    let is_from_above = matches!(args.from, ViewName::Above | ViewName::Oblique);
+    let ceiling = Ceiling::of(args.max_height, map, &path, is_from_above && is_whole)?;
     let path = if args.no_path { Vec::new() } else { path };
     let resolution_m = map.config().grid.resolution_m();
     let mut title = format!("{}: {resolution_m} m voxels", name_of(&args.map));
@@ -273,9 +278,6 @@ fn caption(args: &PictureArgs, drawn: &Drawn, marked: Option<u64>) -> String {
     };
     let changes = if args.since.is_some() { "; blue appeared, orange vanished, grey unchanged" } else { "" };
     let moving = match (marked, drawn.moving_points.unwrap_or_default()) {
-        (None, _) if drawn.cells_without_value == drawn.solid_cells && drawn.solid_cells > 0 => {
-            "; no value to show: the points of the scans had none".to_owned()
-        }
         (None, _) => String::new(),
         (Some(0), _) => "; no point is marked as moving: `voxtile clean` marks them".to_owned(),
         (Some(marked), drawn) if marked == drawn => format!("; {} moving points", HumanCount(marked)),

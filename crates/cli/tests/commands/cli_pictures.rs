@@ -263,11 +263,14 @@ fn ceilings_of_rooms_are_cut() {
         assert_eq!(draw(&open, more)["max_height_m"], Value::Null);
     }
     assert!(draw(&room, &[])["range"][1].as_f64() < Some(0.05));
-    for more in [&["--max-height", "none"][..], &["--from", "side-x"], &["--slice", "1.75"]] {
+    let region = ["--region", "-9", "-9", "-9", "9", "9", "9"];
+    for more in [&["--max-height", "none"][..], &["--from", "side-x"], &["--slice", "1.75"], &region] {
         let whole = draw(&room, more);
         assert_eq!(whole["max_height_m"], Value::Null, "{more:?}");
         assert!(whole["range"][1].as_f64() > Some(1.0), "{whole}");
     }
+    output(&["snapshot", text(&room), "one"]);
+    assert_eq!(draw(&room, &["--since", "one"])["max_height_m"], Value::Null);
     assert_eq!(draw(&open, &["--max-height", "-1"])["range"][1].as_f64().map(|m| m < -1.0), Some(true));
     let said = output(&["picture", text(&room), "-o", text(&file)]);
     assert!(said.contains("ceiling cut at 0.05 m, the height of the sensor"), "{said}");
@@ -288,6 +291,8 @@ fn ceilings_of_rooms_are_cut() {
     assert!(has_bar(), "{bar}");
     let (code, error) = failure(&["picture", text(&room), "-o", text(&file), "--max-height", "high"]);
     assert!(code == 2 && error.contains("a height in metres"), "{error}");
+    let (code, error) = failure(&["picture", text(&room), "-o", text(&file), "--azimuth", "12"]);
+    assert!(code == 2 && error.contains("--from oblique"), "{error}");
 }
 
 /// The report is valid XML with the numbers of `info`, and refers to no other resource.

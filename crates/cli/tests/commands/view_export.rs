@@ -198,6 +198,22 @@ fn a_page_replaces_no_files() {
     let error = refusal(&["view", text(&map), "--export-page", text(&page)]);
     assert!(error.contains("not empty"), "{error}");
     assert_eq!(files(&page), before);
+    let (file, inner) = (folder.path().join("a file"), map.join("inner"));
+    fs::write(&file, "mine").unwrap();
+    fs::create_dir(&inner).unwrap();
+    for output in [&file, &inner] {
+        assert!(!refusal(&["view", text(&map), "--export-page", text(output)]).is_empty(), "{output:?}");
+    }
+    assert_eq!((fs::read(&file).unwrap(), fs::read_dir(&inner).unwrap().count()), (b"mine".to_vec(), 0));
+    fs::remove_dir(&inner).unwrap();
+    #[cfg(unix)]
+    {
+        let (empty, link) = (folder.path().join("empty"), folder.path().join("link"));
+        fs::create_dir(&empty).unwrap();
+        std::os::unix::fs::symlink(&empty, &link).unwrap();
+        assert!(refusal(&["view", text(&map), "--export-page", text(&link)]).contains("link"));
+        assert_eq!(fs::read_dir(&empty).unwrap().count(), 0);
+    }
     let missing = folder.path().join("missing");
     let error = refusal(&["view", text(&missing), "--export-page", text(&folder.path().join("other"))]);
     assert!(error.contains("missing"), "{error}");

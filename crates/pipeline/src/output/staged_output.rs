@@ -1,7 +1,8 @@
 use super::target::{TargetKind, check_target, folder_of, sync_folder};
-use std::fs::{self, File};
+use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
+use voxtile::store::{Disk, FsDisk, check_outside_of_maps};
 use voxtile::{Error, Result};
 
 /// A file or folder that a library writes by path, and its companion files. All are written to a temporary folder and
@@ -22,6 +23,22 @@ impl StagedOutput {
         let staging = tempfile::Builder::new().prefix(".voxtile-").tempdir_in(folder_of(target));
         let staging = staging.map_err(|error| Error::io(target, "create", error))?;
         Ok(Self { target: target.to_owned(), staging })
+    }
+
+    /// Like [`StagedOutput::beside`], for an output that is a folder.
+    ///
+    /// # Errors
+    ///
+    /// Also fails if the target is a file or a link, or is inside a map.
+    pub fn folder_beside(target: &Path) -> Result<Self> {
+        match fs::symlink_metadata(target) {
+            Ok(found) if !found.is_dir() => {
+                let reason = "is a file or a link, but the output is a folder: choose another name, or remove it first";
+                return Err(Error::argument(target.display().to_string(), reason));
+            }
+            _ => check_outside_of_maps(target)?,
+        }
+        Self::beside(target)
     }
 
     /// Returns the temporary folder.
@@ -132,13 +149,21 @@ fn check_staged_target(target: &Path) -> Result<()> {
     Err(Error::argument(target.display().to_string(), reason))
 }
 
-/// Syncs a file, or a folder with its files.
+/// Syncs a file, or a folder with its files, many at once.
 fn sync_all(path: &Path) -> io::Result<()> {
-    if path.is_dir() {
-        for entry in std::fs::read_dir(path)? {
-            sync_all(&entry?.path())?;
-        }
-        return sync_folder(path);
+    let (mut files, mut folders) = (Vec::new(), Vec::new());
+    list(path, &mut files, &mut folders)?;
+    FsDisk.sync_all(&files, &folders).into_iter().flatten().collect()
+}
+
+fn list(path: &Path, files: &mut Vec<PathBuf>, folders: &mut Vec<PathBuf>) -> io::Result<()> {
+    if !path.is_dir() {
+        files.push(path.to_owned());
+        return Ok(());
     }
-    File::open(path)?.sync_all()
+    for entry in fs::read_dir(path)? {
+        list(&entry?.path(), files, folders)?;
+    }
+    folders.push(path.to_owned());
+    Ok(())
 }

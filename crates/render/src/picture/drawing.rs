@@ -369,7 +369,8 @@ fn with_air(known: &Known) -> ([usize; 2], [usize; 2]) {
 
 /// Returns a picture without voxels.
 pub(super) fn nothing(picture: &Picture, grid: &Grid, tiles: u64, unread: Vec<TileIndex>) -> Drawn {
-    let measure = Measure::of(EMPTY_SIZE, picture.dpi);
+    // Type of another size would not fit.
+    let measure = Measure::of(EMPTY_SIZE, None);
     let size = if picture.has_legend { EMPTY_SIZE } else { [1; 2] };
     let theme = Theme::of(picture.background);
     let mut canvas = Canvas::new(size[0], size[1], &theme);

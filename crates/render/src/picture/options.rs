@@ -12,7 +12,7 @@ use voxtile_distance::DistanceOptions;
 /// Options of a picture of a map.
 ///
 /// Memory: 12 bytes per cell (44 with the colors of a layer, one more with moving points), 4 per pixel, and one tile
-/// per thread, whatever the size of the map. An oblique view needs 36 bytes per pixel, or 12 beyond 8 million pixels.
+/// per thread, whatever the size of the map. An oblique view needs 68 bytes per pixel, or 20 beyond 8 million pixels.
 #[derive(Clone, Debug)]
 pub struct Picture {
     pub(super) view: View,
@@ -91,10 +91,10 @@ impl Picture {
         Self { most_px: most_px.map(|px| px.clamp(1, MAX_PX)), ..self }
     }
 
-    /// Sets the resolution in pixels per inch, 10 to 10,000: the PNG has its physical size, and type and lines have
+    /// Sets the resolution in pixels per inch, 10 to 2,400: the PNG has its physical size, and type and lines have
     /// those of print. `None`, the default, makes the picture 17 cm wide, the text of an A4 page.
     pub fn with_dpi(self, dpi: Option<f64>) -> Self {
-        let dpi = dpi.filter(|dpi| dpi.is_finite()).map(|dpi| dpi.clamp(10.0, 10_000.0));
+        let dpi = dpi.filter(|dpi| dpi.is_finite()).map(|dpi| dpi.clamp(10.0, 2_400.0));
         Self { dpi, ..self }
     }
 

@@ -30,11 +30,14 @@ impl Trajectory<'_> {
     pub fn draw(&self, canvas: &mut Canvas, corner: [usize; 2], measure: Measure, theme: &Theme) {
         let Self { path_m, samples, plan, resolution_m } = *self;
         let base = plan.frame.base;
-        let places: Vec<([f64; 2], f64)> = path_m
+        let mut places: Vec<([f64; 2], f64)> = path_m
             .iter()
             .filter(|at| at.iter().all(|k| k.is_finite()))
             .map(|at| plan.position_px(std::array::from_fn(|k| at[k] / resolution_m - f64::from(base[k]))))
             .collect();
+        if let [only] = places[..] {
+            places.push(only);
+        }
         let length =
             |pair: &[([f64; 2], f64)]| (pair[1].0[0] - pair[0].0[0]).hypot(pair[1].0[1] - pair[0].0[1]);
         let mut steps: Vec<f64> = places.windows(2).map(length).collect();
