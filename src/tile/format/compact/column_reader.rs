@@ -1,19 +1,12 @@
 use super::input::Input;
 use crate::error::{DecodeError, FormatError};
-use std::cell::Cell;
 use std::io::{self, Read};
 use zstd::zstd_safe::{DCtx, get_error_name};
 
 /// Decompresses the columns of a [`ColumnWriter`](super::column_writer::ColumnWriter).
 pub(super) struct ColumnReader {
-    /// `None` only while the reader is dropped.
-    zstd: Option<DCtx<'static>>,
+    zstd: DCtx<'static>,
     compressed: Vec<u8>,
-}
-
-thread_local! {
-    /// Decompressor of the thread's last reader: 160 kB that the next one need not allocate and clear.
-    static KEPT: Cell<Option<DCtx<'static>>> = const { Cell::new(None) };
 }
 
 pub(super) struct Column<'a> {
@@ -26,10 +19,9 @@ pub(super) struct Column<'a> {
 
 impl ColumnReader {
     pub(super) fn new() -> io::Result<Self> {
-        let kept = KEPT.try_with(Cell::take).ok().flatten();
         // `zstd::bulk` would panic if this fails.
-        let zstd = kept.or_else(DCtx::try_create).ok_or(io::ErrorKind::OutOfMemory)?;
-        Ok(Self { zstd: Some(zstd), compressed: Vec::new() })
+        let zstd = DCtx::try_create().ok_or(io::ErrorKind::OutOfMemory)?;
+        Ok(Self { zstd, compressed: Vec::new() })
     }
 
     /// Reads columns; none takes more memory than its limit.
@@ -64,20 +56,12 @@ impl ColumnReader {
         let offset = input.offset;
         self.compressed.resize(compressed_length, 0);
         input.read(&mut self.compressed)?;
-        let zstd = self.zstd.as_mut().ok_or_else(|| io::Error::from(io::ErrorKind::Other))?;
-        let decompressed = zstd.decompress(&mut column.bytes[..], &self.compressed);
+        let decompressed = self.zstd.decompress(&mut column.bytes[..], &self.compressed);
         let wrong = |reason| Err(FormatError::at_offset(offset, format!("{}: {reason}", column.name)).into());
         match decompressed {
             Ok(length) if length == column.bytes.len() => Ok(()),
             Ok(length) => wrong(format!("{length} bytes instead of {}", column.bytes.len())),
             Err(code) => wrong(format!("cannot be decompressed: {}", get_error_name(code))),
         }
-    }
-}
-
-impl Drop for ColumnReader {
-    fn drop(&mut self) {
-        // Fails only in a thread that ends.
-        let _ = KEPT.try_with(|kept| kept.set(self.zstd.take()));
     }
 }
