@@ -69,8 +69,8 @@ impl Nearest {
         outside_m * outside_m
     }
 
-    /// Visits the marked bricks of a block that may contain a nearer voxel, as lower bound of their squared distances and
-    /// position in the block.
+    /// Visits the marked bricks of a block that may contain a nearer voxel: a lower bound of the squared distances of
+    /// their voxels, and their position in the block.
     pub(super) fn for_each_brick(&self, block: &MarkedBlock, mut visit: impl FnMut(f64, usize)) {
         let least: [[f64; BLOCK_STEPS]; 3] = std::array::from_fn(|axis| {
             std::array::from_fn(|step| {

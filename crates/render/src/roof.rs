@@ -4,8 +4,8 @@ use voxtile::mapper::MapView;
 use voxtile::space::{Point, TileIndex, VoxelIndex};
 use voxtile::{Error, Result};
 
-/// Columns around a trajectory, and whether something is above them. Pictures of rooms cut the ceiling, which would hide
-/// everything else.
+/// Columns around a trajectory, and whether something is above them. Pictures of rooms cut the ceiling, which would
+/// hide everything else.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Roof {
@@ -31,8 +31,8 @@ const ROOM_SHARE: f64 = 0.55;
 const MAX_SPREAD_M: f64 = 2.0;
 
 impl Roof {
-    /// Counts the columns around a trajectory; `None` without a position. Reads up to 32 columns of tiles; unreadable tiles
-    /// are skipped.
+    /// Counts the columns around a trajectory; `None` without a position. Reads up to 32 columns of tiles; unreadable
+    /// tiles are skipped.
     ///
     /// # Errors
     ///
@@ -69,9 +69,9 @@ impl Roof {
         self.roofed as f64 / self.columns.max(1) as f64
     }
 
-    /// Returns the height in metres at which pictures of rooms cut the ceiling, that of the sensor; `None` if less than 55 %
-    /// of the columns are roofed, or if the sensor's heights differ by more than 2 m (several storeys, ramps). Measured:
-    /// rooms have 70 to 99 %, streets and campuses 1 to 39 %.
+    /// Returns the height in metres at which pictures of rooms cut the ceiling: that of the sensor. `None` if less than
+    /// 55 % of the columns are roofed, or if the sensor's heights differ by more than 2 m (several storeys, ramps).
+    /// Measured: rooms have 70 to 99 %, streets and campuses 1 to 39 %.
     pub fn cut_m(&self) -> Option<f64> {
         let is_room = self.columns > 0 && self.share() >= ROOM_SHARE && self.spread_m <= MAX_SPREAD_M;
         is_room.then_some(self.sensor_m)

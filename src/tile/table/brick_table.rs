@@ -136,8 +136,8 @@ impl Table {
         Some(VoxelBox { min, end: min.map(|k| k.saturating_add(edge)) })
     }
 
-    /// Visits the blocks of bricks that intersect a box and may contain log-odds of at least a threshold. Returns `false`,
-    /// without visiting any, if the table does not track the bricks for this threshold.
+    /// Visits the blocks of bricks that intersect a box and may contain log-odds of at least a threshold. Returns
+    /// `false`, without visiting any, if the table does not track the bricks for this threshold.
     pub(crate) fn visit_marked(
         &self,
         voxels: &VoxelBox,

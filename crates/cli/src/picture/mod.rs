@@ -194,7 +194,7 @@ fn picture_of(args: &PictureArgs) -> Result<Picture> {
 fn complete(picture: &Picture, args: &PictureArgs, map: &AnyMap) -> Result<Picture> {
     let path = path_of(map);
     let is_layer = args.slice.or(args.distance_slice).is_some();
-    // Changes cover what has not changed, and a region names its own height.
+    // A picture of changes draws them over an unchanged ceiling. A region has an upper limit of its own.
     let is_whole = !is_layer && args.since.is_none() && args.region.is_none();
     let is_from_above = matches!(args.from, ViewName::Above | ViewName::Oblique);
     let ceiling = Ceiling::of(args.max_height, map, &path, is_from_above && is_whole)?;

@@ -25,11 +25,11 @@ impl StagedOutput {
         Ok(Self { target: target.to_owned(), staging })
     }
 
-    /// Like [`StagedOutput::beside`], for an output that is a folder.
+    /// Creates the temporary folder for an output that must be a folder: absent, or empty.
     ///
     /// # Errors
     ///
-    /// Also fails if the target is a file or a link, or is inside a map.
+    /// The target is a file, a symbolic link, inside a map, or not empty, or its parent folder is not writable.
     pub fn folder_beside(target: &Path) -> Result<Self> {
         match fs::symlink_metadata(target) {
             Ok(found) if !found.is_dir() => {

@@ -156,8 +156,8 @@ impl Samples {
 }
 
 impl Frame {
-    /// Returns the visible surface of a cube at an offset from its middle, and its depth towards the viewer; `None` beside
-    /// the cube. In voxels.
+    /// Returns the face of a cube that the viewer sees at an offset from the cube's middle, and how far it is in front
+    /// of the middle. `None` if the cube does not cover this place. All lengths are in voxels.
     #[inline]
     fn hit(&self, right: f64, up: f64) -> Option<(Surface, f64)> {
         let camera = &self.camera;
