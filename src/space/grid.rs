@@ -155,7 +155,13 @@ impl Grid {
     /// Converts a point to units of voxels: its floor is the voxel index.
     #[inline]
     pub fn to_voxel_units(&self, point_m: Point) -> Point {
-        point_m.map(|coordinate| coordinate * self.inv_resolution)
+        point_m.map(|coordinate| self.to_voxel_unit(coordinate))
+    }
+
+    /// One coordinate of [`Grid::to_voxel_units`].
+    #[inline]
+    pub(crate) fn to_voxel_unit(&self, coordinate_m: f64) -> f64 {
+        coordinate_m * self.inv_resolution
     }
 
     /// The voxel that contains a point; `None` if the point is not finite or its index exceeds `i32`.
@@ -169,13 +175,24 @@ impl Grid {
     pub fn voxel_of_units(point: Point) -> Option<VoxelIndex> {
         // NaN is not in the range either.
         let is_in_range = |x: f64| x >= f64::from(i32::MIN) && x < f64::from(i32::MAX);
-        point.iter().all(|&x| is_in_range(x)).then(|| point.map(floor))
+        point.iter().all(|&x| is_in_range(x)).then(|| point.map(Self::floor_of_fitting))
     }
 
     /// The voxel of a point in units of voxels, whose index is known to fit.
     #[inline]
     pub(crate) fn voxel_of_fitting_units(point: Point) -> VoxelIndex {
-        point.map(floor)
+        point.map(Self::floor_of_fitting)
+    }
+
+    /// Floor of a number in the range of `i32`; any number outside. Without instructions that some processors lack.
+    #[inline]
+    pub(crate) fn floor_of_fitting(number: f64) -> i32 {
+        // Adding this to a number in this range leaves the nearest integer in the lowest bits.
+        const ROUND: f64 = 1.5 * (1_u64 << 52) as f64;
+        let rounded = number + ROUND;
+        let nearest = rounded.to_bits() as i32;
+        // If rounding up exceeds the range of `i32`, the subtraction wraps back into it.
+        nearest.wrapping_sub(i32::from(rounded - ROUND > number))
     }
 
     /// The tile that contains a voxel.
@@ -246,17 +263,6 @@ impl Grid {
     }
 }
 
-/// Floor of a number in the range of `i32`, without instructions that some processors lack.
-#[inline]
-fn floor(number: f64) -> i32 {
-    // Adding this to a number in this range leaves the nearest integer in the lowest bits.
-    const ROUND: f64 = 1.5 * (1_u64 << 52) as f64;
-    let rounded = number + ROUND;
-    let nearest = rounded.to_bits() as i32;
-    // If rounding up exceeds the range of `i32`, the subtraction wraps back into it.
-    nearest.wrapping_sub(i32::from(rounded - ROUND > number))
-}
-
 fn clamp_to_i32(value: i64) -> i32 {
     value.clamp(i64::from(i32::MIN), i64::from(i32::MAX)) as i32
 }
@@ -274,12 +280,12 @@ mod tests {
     fn floor_equals_the_library_function() {
         let whole = [-2_147_483_648.0, -7.0, -1.0, 0.0, 1.0, 6.0, 2_147_483_646.0];
         for number in whole.into_iter().flat_map(|x: f64| [x, x.next_up(), x + 0.25, x + 0.5, x + 0.75]) {
-            assert_eq!(floor(number), number.floor() as i32, "{number}");
+            assert_eq!(Grid::floor_of_fitting(number), number.floor() as i32, "{number}");
             let below = (number + 1.0).next_down();
-            assert_eq!(floor(below), below.floor() as i32, "{below}");
+            assert_eq!(Grid::floor_of_fitting(below), below.floor() as i32, "{below}");
         }
-        assert_eq!(floor(-0.0), 0);
-        assert_eq!(floor(-1e-300), -1);
+        assert_eq!(Grid::floor_of_fitting(-0.0), 0);
+        assert_eq!(Grid::floor_of_fitting(-1e-300), -1);
     }
 
     #[test]

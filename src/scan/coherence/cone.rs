@@ -1,6 +1,6 @@
 use crate::scan::pages::Local;
-use crate::scan::ray::{RayOrigin, SlabRay, voxel};
-use crate::space::{Point, VoxelIndex};
+use crate::scan::ray::{RayOrigin, Slope, voxel};
+use crate::space::{Grid, Point, VoxelIndex};
 
 /// Number of sides of a cube around the sensor: two per axis, the lower first.
 pub(crate) const SIDES: usize = 6;
@@ -29,21 +29,22 @@ pub(crate) struct Cone {
     is_up: bool,
 }
 
-/// Returns the index of the cell through which a ray passes, over all sides; `None` for a ray too short to have a
-/// direction.
+/// Number of cells over all sides.
+pub(crate) const ALL_CELLS: usize = SIDES * CELLS_PER_SIDE;
+
+/// In place of a cell: a ray too short to have a direction.
+pub(crate) const NO_DIRECTION: u32 = ALL_CELLS as u32;
+
+/// Returns the number of the cell through which a ray passes, over all sides, or [`NO_DIRECTION`]. Without branches, so that a loop over many rays becomes vector instructions.
 #[inline]
-pub(crate) fn cell_of(ray: &SlabRay) -> Option<usize> {
-    let [x, y, z] = ray.direction;
-    let [a, b, c] = match ray.axis {
-        0 => [x, y, z],
-        1 => [y, x, z],
-        _ => [z, x, y],
-    };
-    // Position on the side, from 0 to `CELLS`.
-    let place = |slope: f64| (slope * ray.per_slab + 1.0) * (CELLS / 2) as f64;
-    let cell = |slope: f64| (place(slope) as i32 as usize).min(CELLS - 1);
-    let side = 2 * ray.axis + usize::from(a > 0.0);
-    ray.per_slab.is_finite().then(|| (side * CELLS + cell(b)) * CELLS + cell(c))
+pub(crate) fn cell_of(slope: &Slope) -> u32 {
+    // Position on the side, from 0 to `CELLS`, apart from rounding.
+    let place = |across: f64| (across * slope.per_slab + 1.0) * (CELLS / 2) as f64;
+    let cell = |across: f64| Grid::floor_of_fitting(place(across)).clamp(0, CELLS as i32 - 1) as u32;
+    let side = 2 * slope.axis + u32::from(slope.along > 0.0);
+    let [b, c] = slope.across.map(cell);
+    let number = (side * CELLS as u32 + b) * CELLS as u32 + c;
+    if slope.per_slab < f64::INFINITY { number } else { NO_DIRECTION }
 }
 
 impl Cone {

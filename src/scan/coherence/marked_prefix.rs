@@ -1,6 +1,6 @@
-use super::cone::{CELLS, CELLS_PER_SIDE, Cone, SIDES, cell_of};
+use super::cone::{ALL_CELLS, CELLS, CELLS_PER_SIDE, Cone};
 use crate::scan::pages::{MarkedPage, PageMap};
-use crate::scan::ray::{RayCut, RayOrigin, SlabRay};
+use crate::scan::ray::{RayCut, RayOrigin};
 
 /// For each cone of directions, the number of slabs at the start of its rays in which all voxels are already marked.
 ///
@@ -10,7 +10,7 @@ use crate::scan::ray::{RayCut, RayOrigin, SlabRay};
 /// The marks are the same as without prefixes.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct MarkedPrefixes {
-    /// Indexed by [`cell_of`].
+    /// Indexed by [`cell_of`](super::cell_of). The last one, for rays without a direction, remains empty.
     cones: Vec<MarkedPrefix>,
 }
 
@@ -33,7 +33,7 @@ impl MarkedPrefixes {
     /// Clears the prefixes; the memory is kept.
     pub(crate) fn clear(&mut self) {
         self.cones.clear();
-        self.cones.resize(SIDES * CELLS_PER_SIDE, MarkedPrefix::default());
+        self.cones.resize(ALL_CELLS + 1, MarkedPrefix::default());
     }
 
     pub(crate) fn bytes(&self) -> usize {
@@ -41,12 +41,11 @@ impl MarkedPrefixes {
     }
 
     /// Number of slabs from the sensor in which all voxels along the ray are marked; `None` if these are all slabs of
-    /// the ray.
+    /// the ray. `cell` is the ray's [`cell_of`](super::cell_of), and `last_slab` is numbered from that of the sensor.
     #[inline]
-    pub(crate) fn of(&mut self, ray: &SlabRay) -> Option<u32> {
-        let Some(cell) = cell_of(ray) else { return Some(0) };
-        let cone = &mut self.cones[cell];
-        let last = ray.last_slab().min(u16::MAX.into()) as u16;
+    pub(crate) fn of(&mut self, cell: u32, last_slab: u32) -> Option<u32> {
+        let cone = &mut self.cones[cell as usize];
+        let last = last_slab.min(u16::MAX.into()) as u16;
         cone.farthest = cone.farthest.max(last);
         (last >= cone.slabs).then_some(cone.slabs.into())
     }
@@ -61,7 +60,7 @@ impl MarkedPrefixes {
         edges: &[usize],
         cut: Option<&RayCut<'_>>,
     ) {
-        for (side, cones) in self.cones.chunks_mut(CELLS_PER_SIDE).enumerate() {
+        for (side, cones) in self.cones[..ALL_CELLS].chunks_mut(CELLS_PER_SIDE).enumerate() {
             for &edge in edges {
                 match side / 2 {
                     0 => extend_side::<0, 1, 2>(cones, side, pages, origin, edge, cut),

@@ -8,5 +8,6 @@ mod cone;
 mod marked_prefix;
 mod sampling;
 
+pub(crate) use cone::cell_of;
 pub(crate) use marked_prefix::MarkedPrefixes;
 pub(crate) use sampling::{sampling_passes, single_pass};

@@ -30,7 +30,7 @@ impl<F: Footprint> PageMap<F> {
         self.window = window;
         self.max_fast = max_fast;
         self.directory.clear();
-        self.directory.resize(window.pages().map(|pages| pages as usize).iter().product(), 0);
+        self.directory.resize(window.count(), 0);
         self.far.clear();
         // Keep at most as many pages as the last scan had, so that a scan with distant stray rays does not occupy
         // memory permanently. Only fast pages are kept, so at most `max_fast`.

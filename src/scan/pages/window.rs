@@ -55,9 +55,14 @@ impl Window {
         ((x / 64 * height + y / 64) * depth + z / 64) as usize
     }
 
-    /// Number of pages along each axis.
+    #[cfg(test)]
     pub(crate) fn pages(&self) -> [u32; 3] {
         self.pages
+    }
+
+    /// Number of pages.
+    pub(crate) fn count(&self) -> usize {
+        self.pages.map(|pages| pages as usize).iter().product()
     }
 
     /// Lowest voxel of the window.

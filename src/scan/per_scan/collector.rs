@@ -1,10 +1,11 @@
 use super::bricks::{Intensities, add_bricks, hits_and_misses, updates_by_tile};
 use super::far_bricks::FarBricks;
+use super::hit_batch::HitBatch;
 use super::page_marks::PageMarks;
 use super::page_updates::updates_of_pages;
 use crate::scan::ScanReport;
 use crate::scan::clearing::Clearance;
-use crate::scan::coherence::MarkedPrefixes;
+use crate::scan::coherence::{MarkedPrefixes, cell_of};
 use crate::scan::pages::{Footprint, MarkedBrick, MarkedPage, PAGE_EDGE, PageMap, Window};
 use crate::scan::ray::{RayCut, RayEnd, RayOrigin, SlabRay};
 use crate::scan::spill::ScanParts;
@@ -82,12 +83,40 @@ impl PerScanCollector {
         // Selects the rays that have to be traced. Branchless, because a branch would be unpredictable.
         let (mut left, mut count) = ([(0, 0); BATCH], 0);
         for (number, &end) in ends.iter().enumerate() {
-            let slabs = self.prefixes.of(&SlabRay::new(origin, end));
+            let ray = SlabRay::new(origin, end);
+            let slabs = self.prefixes.of(cell_of(&ray.slope()), ray.last_slab());
             left[count % BATCH] = (number, slabs.unwrap_or(0));
             count += usize::from(slabs.is_some());
         }
-        for &(number, slabs) in &left[..count] {
-            let end = ends[number];
+        self.trace(origin, left[..count].iter().map(|&(number, slabs)| (ends[number], slabs)), parts);
+    }
+
+    /// Like [`PerScanCollector::take`], for rays that all end in hits and are not cut.
+    pub(crate) fn take_hits(
+        &mut self,
+        origin: &RayOrigin,
+        hits: &HitBatch,
+        parts: Option<&ScanParts<'_>>,
+    ) {
+        let (mut left, mut count) = ([(0, 0); BATCH], 0);
+        for (row, ray) in hits.rays().iter().enumerate() {
+            self.hit(hits.voxel(row), None);
+            let slabs = self.prefixes.of(ray.cell, ray.last_slab);
+            left[count % BATCH] = (row, slabs.unwrap_or(0));
+            count += usize::from(slabs.is_some());
+        }
+        self.trace(origin, left[..count].iter().map(|&(row, slabs)| (hits.end(row), slabs)), parts);
+    }
+
+    /// Marks the voxels before the ends of rays, after the given number of slabs.
+    #[inline]
+    fn trace(
+        &mut self,
+        origin: &RayOrigin,
+        rays: impl Iterator<Item = (RayEnd, u32)>,
+        parts: Option<&ScanParts<'_>>,
+    ) {
+        for (end, slabs) in rays {
             let ray = SlabRay::new(origin, end);
             if let Some(parts) = parts {
                 let new_bytes = BYTES_PER_RAY + BYTES_PER_SLAB * ray.slabs_after(slabs) as usize;
@@ -339,7 +368,8 @@ mod tests {
                 let part: Vec<RayEnd> = ends.iter().skip(round).step_by(8).copied().collect();
                 shared += part
                     .iter()
-                    .filter(|end| collector.prefixes.of(&SlabRay::new(origin, **end)) != Some(0))
+                    .map(|end| SlabRay::new(origin, *end))
+                    .filter(|ray| collector.prefixes.of(cell_of(&ray.slope()), ray.last_slab()) != Some(0))
                     .count();
                 part.chunks(BATCH).for_each(|batch| collector.take(origin, batch, false, None));
                 collector.extend_prefixes(origin, &[8, 4, 2, 1], None);

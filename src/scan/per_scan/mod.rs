@@ -5,6 +5,7 @@
 mod bricks;
 mod collector;
 mod far_bricks;
+mod hit_batch;
 mod page_marks;
 mod page_updates;
 
@@ -12,3 +13,4 @@ pub(crate) use bricks::{
     Intensities, guarded_updates, hits_and_misses, marks_by_tile, merge_bricks, updates_by_tile,
 };
 pub(crate) use collector::{BATCH, PerScanCollector};
+pub(crate) use hit_batch::HitBatch;

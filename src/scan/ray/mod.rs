@@ -12,6 +12,7 @@ mod ray_walk;
 mod slab_path;
 mod slab_ray;
 mod slab_span;
+mod slope;
 
 pub(crate) use range::{NO_RETURN_M, RangeRule, Ranged};
 pub use range::{is_hit, no_return};
@@ -23,3 +24,4 @@ pub use ray_walk::{MAX_RAY_STEPS, RayWalk};
 pub(crate) use slab_path::Stretch;
 pub(crate) use slab_ray::{SlabRay, voxel};
 pub(crate) use slab_span::SlabSpan;
+pub(crate) use slope::Slope;

@@ -66,13 +66,19 @@ impl RangeRule {
     /// Applies the rule to a point in metres.
     #[inline]
     pub(crate) fn apply(&self, point: Point, skipped: &mut SkippedPoints) -> Ranged {
-        let [dx, dy, dz]: Point = std::array::from_fn(|k| point[k] - self.origin[k]);
-        let squared = dx * dx + dy * dy + dz * dz;
-        // Also false for non-finite points and for the origin.
-        match squared > self.certain_m2[0] && squared < self.certain_m2[1] {
+        match self.is_certainly_hit(point) {
             true => Ranged::Hit(point),
             false => self.apply_exactly(point, skipped),
         }
+    }
+
+    /// Returns whether a point in metres is a hit, if that needs no square root. Also `false` for points that are not
+    /// finite and for the origin.
+    #[inline]
+    pub(crate) fn is_certainly_hit(&self, point: Point) -> bool {
+        let [dx, dy, dz]: Point = std::array::from_fn(|k| point[k] - self.origin[k]);
+        let squared = dx * dx + dy * dy + dz * dz;
+        (squared > self.certain_m2[0]) & (squared < self.certain_m2[1])
     }
 
     /// A point at exactly the max range is a hit, as in OctoMap.

@@ -3,6 +3,7 @@ use super::ray_origin::RayOrigin;
 use super::ray_walk::RayWalk;
 use super::slab_path::SlabPath;
 use super::slab_span::SlabSpan;
+use super::slope::Slope;
 use crate::scan::pages::{Footprint, Local, PageMap};
 use crate::space::{Point, VoxelBox, VoxelIndex};
 
@@ -30,15 +31,14 @@ impl<'a> SlabRay<'a> {
     #[inline]
     pub(crate) fn new(origin: &'a RayOrigin, RayEnd { point: end, voxel: last, span, .. }: RayEnd) -> Self {
         let direction: Point = std::array::from_fn(|k| end[k] - origin.point[k]);
-        let [x, y, z] = direction.map(f64::abs);
-        let (axis, longest) = if x >= y && x >= z {
-            (0, x)
-        } else if y >= z {
-            (1, y)
-        } else {
-            (2, z)
-        };
-        Self { origin, end, last, direction, axis, per_slab: 1.0 / longest, span }
+        let Slope { axis, per_slab, .. } = Slope::of(direction);
+        Self { origin, end, last, direction, axis: axis as usize, per_slab, span }
+    }
+
+    /// The direction by its main axis.
+    #[inline]
+    pub(crate) fn slope(&self) -> Slope {
+        Slope::of(self.direction)
     }
 
     /// Number of slabs after that of the origin.

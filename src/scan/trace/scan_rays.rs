@@ -7,7 +7,7 @@ use crate::scan::clearing::Clearance;
 use crate::scan::coherence::{sampling_passes, single_pass};
 use crate::scan::pages::{MAX_RAYS, Window};
 use crate::scan::per_ray::{OrderedCollector, PerRayCollector, drain_in_order, updates_in_order};
-use crate::scan::per_scan::{BATCH, PerScanCollector};
+use crate::scan::per_scan::{BATCH, HitBatch, PerScanCollector};
 use crate::scan::ray::{
     MAX_RAY_STEPS, NO_RETURN_M, RangeRule, Ranged, RayCut, RayEnd, RayOrigin, SlabRay, SlabSpan,
 };
@@ -90,7 +90,11 @@ impl<'a> ScanRays<'a> {
             max_threads,
             stop,
         };
-        let bounds = scan_rays.bounds()?;
+        let in_range = scan_rays.bounds_of_range();
+        let bounds = match in_range.filter(|bounds| Window::around(voxel, *bounds).count() <= points.len()) {
+            Some(bounds) => bounds,
+            None => scan_rays.bounds()?,
+        };
         scan_rays.window = Window::around(voxel, bounds);
         scan_rays.all_in_reach = is_in_reach(voxel, bounds);
         Ok(scan_rays)
@@ -175,6 +179,7 @@ impl<'a> ScanRays<'a> {
             let (mut hits, mut ends) = (self.no_hits(layers), Vec::new());
             let mut report = ScanReport { points: range.len() as u64, ..ScanReport::default() };
             let mut batch = Vec::with_capacity(BATCH);
+            let mut hit_batch = self.are_hits_whole(layers).then(Box::<HitBatch>::default);
             let (mut seen, mut extend_at) = (0, 0);
             let mut marks = ChunkMarks::from(self.points.moving(), range.start);
             self.for_each_attributed_chunk(layers, range, &mut |points, intensities, attributes| {
@@ -204,6 +209,13 @@ impl<'a> ScanRays<'a> {
                     if extends { sampling_passes(0..points.len()) } else { single_pass(0..points.len()) }
                 {
                     collector.extend_prefixes(&self.origin, pass.squares, self.cut.as_ref());
+                    if let Some(hits) = &mut hit_batch {
+                        let of_pass = pass.points().map(|number| points[number]);
+                        if !self.take_batches(of_pass, hits, collector, parts, &mut report) {
+                            return false;
+                        }
+                        continue;
+                    }
                     for number in pass.points() {
                         batch.extend(if layers.is_none() {
                             let intensity = intensity(intensities, number);
@@ -232,6 +244,39 @@ impl<'a> ScanRays<'a> {
             all.1.append(hits);
         }
         Ok((&mut collectors[..threads], all.0, all.1))
+    }
+
+    /// Returns whether each point that the range rule makes a hit is one, with a whole ray.
+    fn are_hits_whole(&self, layers: Layers) -> bool {
+        self.all_in_reach
+            && self.cut.is_none()
+            && layers.is_none()
+            && self.points.moving().is_none()
+            && !self.model.needs_intensity()
+    }
+
+    /// Adds points, most of which are hits, in batches. Returns whether to continue.
+    fn take_batches(
+        &self,
+        mut points: impl Iterator<Item = Point>,
+        hits: &mut HitBatch,
+        collector: &mut PerScanCollector,
+        parts: Option<&ScanParts<'_>>,
+        report: &mut ScanReport,
+    ) -> bool {
+        let mut others = Vec::new();
+        let mut take = |hits: &mut HitBatch| {
+            hits.remove_uncertain(&self.range, |point| others.extend(self.end(point, 0.0, false, report)));
+            hits.find_rays(self.mapped.grid, &self.origin);
+            collector.take_hits(&self.origin, hits, parts);
+            hits.clear();
+            if !others.is_empty() {
+                collector.take(&self.origin, &others, false, parts);
+                others.clear();
+            }
+            self.continues(parts)
+        };
+        points.all(|point| !hits.push(point) || take(hits)) && take(hits)
     }
 
     /// Insertion per ray, in the order of the points: the misses of a ray from the sensor outward, then its hit.
@@ -401,6 +446,13 @@ impl<'a> ScanRays<'a> {
         }
         let collectors = collectors[..parts].par_iter_mut().enumerate();
         collectors.map(|(part, collector)| collect(collector, part_of(&points, part, parts))).collect()
+    }
+
+    /// Bounds of all points within the max range, in units of voxels; `None` without one.
+    fn bounds_of_range(&self) -> Option<(Point, Point)> {
+        let range_m = self.rays.max_range_m?;
+        let side = |range_m: f64| self.mapped.grid.to_voxel_units(self.origin_m.map(|x| x + range_m));
+        Some((side(-range_m), side(range_m)))
     }
 
     /// Bounds of the finite points, clipped at the max range, in units of voxels.

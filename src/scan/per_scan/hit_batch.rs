@@ -1,0 +1,105 @@
+use super::collector::BATCH;
+use crate::scan::coherence::cell_of;
+use crate::scan::ray::{RangeRule, RayEnd, RayOrigin, SlabSpan, Slope};
+use crate::space::{Grid, Point, VoxelIndex};
+
+/// Batch of at most [`BATCH`] points that are hits, with what their rays need, in columns.
+///
+/// Each step is one loop over all rows without a branch, which becomes vector instructions. Rows after the last point
+/// are unused.
+#[derive(Debug)]
+pub(crate) struct HitBatch {
+    len: usize,
+    /// World frame, by axis: in metres, after [`HitBatch::find_rays`] in units of voxels.
+    points: [[f64; BATCH]; 3],
+    /// By axis.
+    voxels: [[i32; BATCH]; 3],
+    rays: [HitRay; BATCH],
+}
+
+/// What decides whether a ray has to be walked.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct HitRay {
+    /// Cell of directions; see [`cell_of`].
+    pub(super) cell: u32,
+    /// The last slab, numbered from that of the origin.
+    pub(super) last_slab: u32,
+}
+
+impl Default for HitBatch {
+    fn default() -> Self {
+        let voxels = [[0; BATCH]; 3];
+        Self { len: 0, points: [[0.0; BATCH]; 3], voxels, rays: [HitRay::default(); BATCH] }
+    }
+}
+
+impl HitBatch {
+    pub(crate) fn clear(&mut self) {
+        self.len = 0;
+    }
+
+    /// Adds a point in metres. Returns whether the batch is full.
+    #[inline]
+    pub(crate) fn push(&mut self, point: Point) -> bool {
+        let row = self.len % BATCH;
+        (0..3).for_each(|axis| self.points[axis][row] = point[axis]);
+        self.len = row + 1;
+        self.len == BATCH
+    }
+
+    /// Removes the points that are not certainly hits, and passes them to `visit`.
+    pub(crate) fn remove_uncertain(&mut self, range: &RangeRule, mut visit: impl FnMut(Point)) {
+        let mut are_hits = [0_u32; BATCH];
+        for (row, is_hit) in are_hits.iter_mut().enumerate() {
+            *is_hit = u32::from(range.is_certainly_hit(self.point(row)));
+        }
+        if are_hits[..self.len].iter().fold(1, |all, is_hit| all & is_hit) == 1 {
+            return;
+        }
+        let before = self.len;
+        self.len = 0;
+        for row in 0..before {
+            let point = self.point(row);
+            match are_hits[row] {
+                0 => visit(point),
+                _ => _ = self.push(point),
+            }
+        }
+    }
+
+    /// Determines the rays to the points, whose voxels must all fit.
+    pub(crate) fn find_rays(&mut self, grid: &Grid, origin: &RayOrigin) {
+        for axis in 0..3 {
+            for (point, voxel) in self.points[axis].iter_mut().zip(&mut self.voxels[axis]) {
+                *point = grid.to_voxel_unit(*point);
+                *voxel = Grid::floor_of_fitting(*point);
+            }
+        }
+        for row in 0..BATCH {
+            let (point, voxel) = (self.point(row), self.voxel(row));
+            let slope = Slope::of(std::array::from_fn(|k| point[k] - origin.point[k]));
+            let [x, y, z]: [u32; 3] = std::array::from_fn(|k| voxel[k].abs_diff(origin.voxel[k]));
+            let last_slab = if slope.axis == 0 { x } else { z };
+            let last_slab = if slope.axis == 1 { y } else { last_slab };
+            self.rays[row] = HitRay { cell: cell_of(&slope), last_slab };
+        }
+    }
+
+    pub(super) fn rays(&self) -> &[HitRay] {
+        &self.rays[..self.len]
+    }
+
+    pub(super) fn end(&self, row: usize) -> RayEnd {
+        RayEnd { point: self.point(row), voxel: self.voxel(row), hit: Some(0.0), span: SlabSpan::WHOLE }
+    }
+
+    #[inline(always)]
+    pub(super) fn voxel(&self, row: usize) -> VoxelIndex {
+        std::array::from_fn(|axis| self.voxels[axis][row % BATCH])
+    }
+
+    #[inline(always)]
+    fn point(&self, row: usize) -> Point {
+        std::array::from_fn(|axis| self.points[axis][row % BATCH])
+    }
+}
