@@ -397,7 +397,8 @@ impl MapView for MapReader {
     }
 
     fn tile_indices(&self) -> Vec<TileIndex> {
-        let mut indices: Vec<_> = self.store.tiles().iter().collect();
+        let mut indices = Vec::with_capacity(self.store.tiles().count());
+        self.store.tiles().iter().for_each(|tile| indices.push(tile));
         indices.sort_unstable();
         indices
     }

@@ -284,8 +284,16 @@ fn take_index(before: TileIndex, input: &mut &[u8]) -> TileIndex {
 /// Passes over numbers at the front.
 pub fn skip_numbers(numbers: usize, input: &mut &[u8]) {
     for _ in 0..numbers {
-        let length = input.iter().position(|byte| byte & 0x80 == 0).map_or(input.len(), |last| last + 1);
-        *input = input.get(length..).unwrap_or_default();
+        *input = match **input {
+            [0..0x80, ref rest @ ..]
+            | [_, 0..0x80, ref rest @ ..]
+            | [_, _, 0..0x80, ref rest @ ..]
+            | [_, _, _, 0..0x80, ref rest @ ..] => rest,
+            _ => {
+                let last = input.iter().position(|byte| byte & 0x80 == 0);
+                last.and_then(|last| input.get(last + 1..)).unwrap_or_default()
+            }
+        };
     }
 }
 
@@ -321,6 +329,15 @@ where
                 return Some((tile, value));
             }
         }
+    }
+
+    /// Most tables have no recent tiles, and the packed ones are then passed in simple loops.
+    fn fold<B, F: FnMut(B, Self::Item) -> B>(mut self, mut state: B, mut visit: F) -> B {
+        while self.recent.peek().is_some() {
+            let Some(next) = self.next() else { return state };
+            state = visit(state, next);
+        }
+        self.packed.fold(state, visit)
     }
 }
 

@@ -92,12 +92,7 @@ impl PerScanCollector {
     }
 
     /// Like [`PerScanCollector::take`], for rays that all end in hits and are not cut.
-    pub(crate) fn take_hits(
-        &mut self,
-        origin: &RayOrigin,
-        hits: &HitBatch,
-        parts: Option<&ScanParts<'_>>,
-    ) {
+    pub(crate) fn take_hits(&mut self, origin: &RayOrigin, hits: &HitBatch, parts: Option<&ScanParts<'_>>) {
         let (mut left, mut count) = ([(0, 0); BATCH], 0);
         for (row, ray) in hits.rays().iter().enumerate() {
             self.hit(hits.voxel(row), None);

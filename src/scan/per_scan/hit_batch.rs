@@ -103,3 +103,55 @@ impl HitBatch {
         std::array::from_fn(|axis| self.points[axis][row % BATCH])
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::config::RayConfig;
+    use crate::scan::ray::SlabRay;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn rays_of_a_batch_equal_those_of_its_points(
+            origin_m in prop::array::uniform3(-20.0..20.0_f64),
+            points in prop::collection::vec(prop::array::uniform3(-40.0..40.0_f64), 0..=BATCH),
+            around in prop::option::of((0..BATCH, prop::array::uniform3(-1..=1_i32))),
+            has_invalid in any::<bool>(),
+        ) {
+            let mut points = points;
+            let row = around.map(|(row, steps)| (row % points.len().max(1), steps));
+            if let Some((row, steps)) = row && row < points.len() {
+                // Along an axis or a diagonal, or the origin itself.
+                points[row] = std::array::from_fn(|k| origin_m[k] + 3.0 * f64::from(steps[k]));
+            }
+            if let Some(point) = points.first_mut().filter(|_| has_invalid) {
+                *point = [f64::NAN, 0.0, f64::INFINITY];
+            }
+            let rays = RayConfig { min_range_m: 0.5, max_range_m: Some(40.0), ..RayConfig::default() };
+            let range = RangeRule::new(&rays, origin_m);
+            let grid = Grid::new(0.25, 10.0).unwrap();
+            let unit = grid.to_voxel_units(origin_m);
+            let origin = RayOrigin::new(unit, grid.voxel_of(origin_m).unwrap());
+            let mut batch = HitBatch::default();
+            for (row, &point) in points.iter().enumerate() {
+                prop_assert_eq!(batch.push(point), row + 1 == BATCH);
+            }
+            let mut others = Vec::new();
+            batch.remove_uncertain(&range, |point| others.push(point));
+            batch.find_rays(&grid, &origin);
+            let (hits, rest): (Vec<Point>, Vec<Point>) =
+                points.iter().partition(|point| range.is_certainly_hit(**point));
+            prop_assert_eq!(format!("{others:?}"), format!("{rest:?}"));
+            prop_assert_eq!(batch.rays().len(), hits.len());
+            for (row, &point) in hits.iter().enumerate() {
+                let end = batch.end(row);
+                prop_assert_eq!(end.point, grid.to_voxel_units(point));
+                prop_assert_eq!(Some(end.voxel), grid.voxel_of(point));
+                let ray = SlabRay::new(&origin, end);
+                let HitRay { cell, last_slab } = batch.rays()[row];
+                prop_assert_eq!((cell, last_slab), (cell_of(&ray.slope()), ray.last_slab()));
+            }
+        }
+    }
+}

@@ -19,7 +19,13 @@ impl Slope {
     pub(crate) fn of([x, y, z]: Point) -> Self {
         let is_x = (x.abs() >= y.abs()) & (x.abs() >= z.abs());
         let is_y = !is_x & (y.abs() >= z.abs());
-        let along = if is_x { x } else if is_y { y } else { z };
+        let along = if is_x {
+            x
+        } else if is_y {
+            y
+        } else {
+            z
+        };
         let across = [if is_x { y } else { x }, if is_x | is_y { z } else { y }];
         Self { axis: if is_x { 0 } else { 2 - u32::from(is_y) }, along, across, per_slab: 1.0 / along.abs() }
     }
