@@ -212,11 +212,14 @@ impl Stretch {
         const RAISED: u64 = NEAR << 32 | NEAR;
         // In a position close to a border, all these bits are 0 after `RAISED` is added.
         const FRACTION: u64 = ((1_u64 << (32 - BITS)) - 1) & !(2 * NEAR - 1);
+        // The bits of an index within the page.
+        const INDEX: u64 = (u32::MAX << (32 - BITS)) as u64;
         let b_of = |at: u64| (at >> (64 - BITS)) as u32;
         let c_of = |at: u64| (at as u32) >> (32 - BITS);
         let cell = |at: u64| part_of_place(B, b_of(at)) | part_of_place(C, c_of(at));
         let mut mark = |place: u32, bits: u64| words[place as usize / 64 % WORDS] |= bits << (place % 64);
-        let Some(last) = self.slabs.checked_sub(1) else { return 0 };
+        // Slabs after the current one. A range would take more instructions a slab.
+        let Some(mut left) = self.slabs.checked_sub(1) else { return 0 };
         let pairs = &PAIRS[usize::from(self.is_up)][A];
         let step = if self.is_up { 1 } else { u32::MAX };
         let mut before = u64::from(self.entry.0) << (64 - BITS) | u64::from(self.entry.1) << (32 - BITS);
@@ -224,24 +227,25 @@ impl Stretch {
         mark(part_of_place(A, a) | cell(before), 1);
         // Part of the Morton position for the lowest slab in the word.
         let mut part = part_of_place(A, a & !3);
-        for done in 0..=last {
+        loop {
             if at & (FRACTION << 32) == 0 || at & FRACTION == 0 {
-                return done;
+                return self.slabs - 1 - left;
             }
             // One branch that is rarely taken is faster than two that are often mispredicted.
             let differ = at ^ before;
-            if b_of(differ) * c_of(differ) != 0 {
+            if (differ & INDEX << 32 != 0) & (differ & INDEX != 0) {
                 let slopes = [(self.slope as i64) >> 32, self.slope as i32 as i64];
                 let at = at.wrapping_sub(RAISED);
                 let past = [(at >> 32 << BITS) as u32, (at << BITS) as u32];
-                let Some(is_b_first) = is_b_crossed_first(past, slopes) else { return done };
+                let Some(is_b_first) = is_b_crossed_first(past, slopes) else { return self.slabs - 1 - left };
                 let (b, c) = if is_b_first { (at, before) } else { (before, at) };
                 let between = part_of_place(B, b_of(b)) | part_of_place(C, c_of(c));
                 mark(part_of_place(A, a) | between, 1);
             }
-            if done == last {
+            if left == 0 {
                 break;
             }
+            left -= 1;
             let cell = cell(at);
             mark(part | cell, pairs[a as usize % 4]);
             let next = a.wrapping_add(step);
