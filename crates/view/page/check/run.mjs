@@ -9,6 +9,7 @@ import { Browser } from './browser.mjs';
 import { checkChanges } from './changes.mjs';
 import { checkColours } from './colours.mjs';
 import { checkExported } from './exported.mjs';
+import { checkJumps } from './jumps.mjs';
 import { checkPeople } from './people.mjs';
 import { checkOpacity, checkTools } from './tools.mjs';
 
@@ -169,6 +170,7 @@ checks: try {
     run('build', scan(0), '-o', map, '--resolution', '0.1', '-q');
     run('build', scan(7), '-o', map, '--append', '-q');
     step(await checkTools({ browser, view, map, run, exported, work }));
+  step(await checkJumps({ browser, view, run, work }));
     step(await checkPeople({ browser, url: await view(map) }));
     run('build', scan(1), '-o', join(work, 'other'), '--resolution', '0.1', '-q');
     await browser.open('about:blank');
@@ -438,6 +440,7 @@ checks: try {
   step(await checkPeople({ browser, url }));
   const running = server;
   step(await checkTools({ browser, view, map, run, exported, work }));
+  step(await checkJumps({ browser, view, run, work }));
   server = running;
   await browser.open('about:blank');
   await browser.open(url);
