@@ -272,6 +272,39 @@ fn the_server_shows_the_map() {
     assert!((beyond["hit"]["distance_m"].as_f64().unwrap() - 4.0).abs() < 0.2, "{beyond}");
 }
 
+#[test]
+fn ceilings_are_those_of_pictures() {
+    let (folder, open) = a_map();
+    let (scans, room) = (folder.path().join("room_scans"), folder.path().join("room"));
+    fs::create_dir(&scans).unwrap();
+    let grid = (0..3600).map(|k| [0.1 * f64::from(k % 60) - 2.95, 0.1 * f64::from(k / 60) - 2.95]);
+    let rows = grid.flat_map(|[x, y]| {
+        [format!("{x} {y} -1.25\n"), format!("{x} {y} 1.35\n"), format!("{x} 3.05 0.05\n")]
+    });
+    fs::write(scans.join("0.xyz"), rows.collect::<String>()).unwrap();
+    fs::write(scans.join("poses_tum.txt"), "0 0 0 1.2 0 0 0 1\n").unwrap();
+    run(&["build", text(&scans), "-o", text(&room), "--resolution", "0.1", "-q"]);
+    run(&["snapshot", text(&room), "monday", "-q"]);
+    let picture = folder.path().join("room.png");
+    assert!(run(&["picture", text(&room), "-o", text(&picture)]).contains("ceiling cut at 1.20 m"));
+
+    let viewer = Viewer::ready(&[&room, &open], &folder.path().join("cache"));
+    let overview = viewer.json("maps/0/overview.json");
+    assert_eq!(overview["ceiling_m"], 1.2);
+    assert_eq!(viewer.json("maps/0@monday/overview.json"), overview);
+    assert_eq!(viewer.get("maps/0@none/overview.json").status, 404);
+    let overview = viewer.json("maps/1/overview.json");
+    assert_eq!(overview["ceiling_m"], Value::Null);
+    let mut heights: Vec<i64> = exported(folder.path(), text(&open)).into_iter().map(|[_, _, z]| z).collect();
+    heights.sort_unstable();
+    let left_out = heights.len() / 50;
+    let ends = [heights[left_out] - 50, heights[heights.len() - 1 - left_out] + 50];
+    for (k, end) in ends.into_iter().enumerate() {
+        let height_m = overview["heights_m"][k].as_f64().unwrap();
+        assert_eq!((1000.0 * height_m).round() as i64, end, "{overview}");
+    }
+}
+
 /// The layer of a node follows its voxels; the page asks for it by name.
 #[test]
 fn layers_are_served_on_request() {

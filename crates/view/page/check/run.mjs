@@ -11,6 +11,7 @@ import { checkColours } from './colours.mjs';
 import { checkExported } from './exported.mjs';
 import { checkJumps } from './jumps.mjs';
 import { checkPeople } from './people.mjs';
+import { checkRooms } from './rooms.mjs';
 import { checkOpacity, checkTools } from './tools.mjs';
 
 const voxtile = process.env.VOXTILE;
@@ -171,6 +172,7 @@ checks: try {
     run('build', scan(7), '-o', map, '--append', '-q');
     step(await checkTools({ browser, view, map, run, exported, work }));
   step(await checkJumps({ browser, view, run, work }));
+  step(await checkRooms({ browser, view, run, exported, work }));
     step(await checkPeople({ browser, url: await view(map) }));
     run('build', scan(1), '-o', join(work, 'other'), '--resolution', '0.1', '-q');
     await browser.open('about:blank');
@@ -441,6 +443,7 @@ checks: try {
   const running = server;
   step(await checkTools({ browser, view, map, run, exported, work }));
   step(await checkJumps({ browser, view, run, work }));
+  step(await checkRooms({ browser, view, run, exported, work }));
   server = running;
   await browser.open('about:blank');
   await browser.open(url);
