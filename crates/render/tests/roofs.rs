@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 use voxtile::scan::PointBatch;
 use voxtile::space::{Aabb, Point};
-use voxtile::{InMemoryMapper, MapConfig, Mapper, Scan, VoxelIndex};
+use voxtile::{InMemoryMapper, MapConfig, MapView, Mapper, Scan, VoxelIndex};
 use voxtile_render::{Picture, Roof, View};
 
 const RESOLUTION_M: f64 = 0.25;
@@ -43,8 +43,8 @@ fn columns_are_those_of_a_naive_count() {
         let [mut free, mut roofed, mut floored]: [HashMap<[i32; 2], bool>; 3] = Default::default();
         let tiles: Vec<[i32; 2]> =
             path.iter().map(|at| [0, 1].map(|k| (at[k] / 4.0).floor() as i32)).collect();
-        for voxel in voxtile::mapper::MapView::tile_indices(&map).into_iter().flat_map(|index| {
-            let tile = voxtile::mapper::MapView::tile_uncached(&map, index).unwrap().unwrap();
+        for voxel in map.tile_indices().into_iter().flat_map(|index| {
+            let tile = map.tile_uncached(index).unwrap().unwrap();
             tile.voxels().collect::<Vec<_>>()
         }) {
             let [x, y, z] = voxel.index;

@@ -1,6 +1,6 @@
 //! `voxtile view --export-page` writes what the server shows.
 
-use crate::view::{Viewer, a_map, run, text};
+use crate::viewer::{Viewer, a_map, run, text};
 use assert_cmd::cargo::cargo_bin;
 use serde_json::{Value, json};
 use std::collections::BTreeSet;
