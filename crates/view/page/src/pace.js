@@ -3,7 +3,7 @@
 // Frames with smooth edges that take longer are too slow while the view changes.
 const SLOW_MS = 80;
 // Still views get smooth edges if this takes less time: input has to wait for it.
-const MOST_SMOOTH_MS = 1500;
+const MOST_SMOOTH_MS = 700;
 // Software takes up to three times longer for smooth edges.
 const SMOOTH_FACTOR = 3;
 // Interval of checks whether a frame is drawn.
