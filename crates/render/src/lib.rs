@@ -24,6 +24,7 @@
 
 pub mod classes;
 mod color_map;
+mod heights;
 mod layer;
 pub mod levels;
 mod oklab;
@@ -34,6 +35,7 @@ mod sight;
 mod survey;
 
 pub use color_map::ColorMap;
+pub use heights::height_range_m;
 pub use layer::Layer;
 pub use picture::{
     Background, Change, ColorBy, Drawing, Drawn, Image, OverTime, Panel, Picture, SideAxis, View, colors,

@@ -13,6 +13,8 @@ pub struct Roof {
     pub columns: u64,
     /// Columns of these with an occupied voxel above the sensor, up to 20 m.
     pub roofed: u64,
+    /// Roofed columns with an occupied voxel below the sensor, down to 20 m.
+    pub floored: u64,
     /// Median height of the sensor in metres.
     pub sensor_m: f64,
     /// Difference between its highest and lowest position, in metres.
@@ -21,12 +23,14 @@ pub struct Roof {
 
 /// Maximum number of columns of tiles that are read, evenly along the trajectory.
 const MAX_STACKS: usize = 32;
-/// A roof is at most this far above the sensor.
-const MAX_ABOVE_M: f64 = 20.0;
+/// A roof is at most this far above the sensor, and a floor below it.
+const MAX_AWAY_M: f64 = 20.0;
 /// Width of the columns: sparse points on a ceiling must not leave gaps between them.
 const COLUMN_M: f64 = 0.5;
 /// Share of roofed columns from which on the map is of rooms.
 const ROOM_SHARE: f64 = 0.55;
+/// Share of roofed columns with a floor from which on z is up. Cameras have other axes: a cut would leave nothing.
+const FLOOR_SHARE: f64 = 0.2;
 /// Heights of a sensor that stays on one floor differ by less. One cut would hide the upper storeys of others.
 const MAX_SPREAD_M: f64 = 2.0;
 
@@ -60,8 +64,9 @@ impl Roof {
         let counts = stacks
             .par_iter()
             .map(|(at, height_m)| count(map, tiles.get(at).map_or(&[], Vec::as_slice), *height_m));
-        let [columns, roofed] = counts.try_reduce(|| [0; 2], |a, b| Ok([a[0] + b[0], a[1] + b[1]]))?;
-        Ok(Some(Self { columns, roofed, sensor_m, spread_m }))
+        let sum = |a: [u64; 3], b: [u64; 3]| Ok([0, 1, 2].map(|k| a[k] + b[k]));
+        let [columns, roofed, floored] = counts.try_reduce(|| [0; 3], sum)?;
+        Ok(Some(Self { columns, roofed, floored, sensor_m, spread_m }))
     }
 
     /// Share of roofed columns, 0 to 1.
@@ -70,27 +75,30 @@ impl Roof {
     }
 
     /// Returns the height in metres at which pictures of rooms cut the ceiling: that of the sensor. `None` if less than
-    /// 55 % of the columns are roofed, or if the sensor's heights differ by more than 2 m (several storeys, ramps).
+    /// 55 % of the columns are roofed, if less than 20 % of these have a floor (z is not up), or if the sensor's heights
+    /// differ by more than 2 m (several storeys, ramps).
     /// Measured: rooms have 70 to 99 %, streets and campuses 1 to 39 %.
     pub fn cut_m(&self) -> Option<f64> {
-        let is_room = self.columns > 0 && self.share() >= ROOM_SHARE && self.spread_m <= MAX_SPREAD_M;
-        is_room.then_some(self.sensor_m)
+        let is_roofed = self.columns > 0 && self.share() >= ROOM_SHARE;
+        let has_floor = self.floored as f64 >= FLOOR_SHARE * self.roofed as f64;
+        (is_roofed && has_floor && self.spread_m <= MAX_SPREAD_M).then_some(self.sensor_m)
     }
 }
 
-/// Returns the columns of a stack of tiles that are free at a height, and those of them with an occupied voxel above.
-fn count(map: &dyn MapView, tiles: &[TileIndex], height_m: f64) -> Result<[u64; 2]> {
+/// Returns the columns of a stack of tiles that are free at a height, those of them with an occupied voxel above, and
+/// those of these with another one below.
+fn count(map: &dyn MapView, tiles: &[TileIndex], height_m: f64) -> Result<[u64; 3]> {
     let (grid, occupied_from) = (map.config().grid, map.config().occupied_log_odds());
-    let Some([_, _, sensor]) = grid.voxel_of([0.0, 0.0, height_m]) else { return Ok([0; 2]) };
-    let above = (MAX_ABOVE_M / grid.resolution_m()).min(1e9) as i32;
-    let highest = sensor.saturating_add(above);
+    let Some([_, _, sensor]) = grid.voxel_of([0.0, 0.0, height_m]) else { return Ok([0; 3]) };
+    let away = (MAX_AWAY_M / grid.resolution_m()).min(1e9) as i32;
+    let [lowest, highest] = [sensor.saturating_sub(away), sensor.saturating_add(away)];
     let wide = ((COLUMN_M / grid.resolution_m()).round().min(1e9) as i32).max(1);
     let edge = grid.voxels_per_tile_edge().div_euclid(wide) + 1;
-    // By column: bit 1 is free at the height of the sensor, bit 2 is occupied above.
+    // By column: bit 1 is free at the height of the sensor, bit 2 is occupied above, bit 4 is occupied below.
     let mut columns = vec![0_u8; (edge * edge) as usize];
     for &index in tiles {
         let voxels = grid.voxels_of_tile(index);
-        if voxels.end[2] <= sensor || voxels.min[2] > highest {
+        if voxels.end[2] <= lowest || voxels.min[2] > highest {
             continue;
         }
         let tile = match map.tile_uncached(index) {
@@ -113,15 +121,16 @@ fn count(map: &dyn MapView, tiles: &[TileIndex], height_m: f64) -> Result<[u64; 
             }
         }
         for voxel in tile.voxels_from(occupied_from) {
-            if (sensor + 1..=highest).contains(&voxel.index[2])
+            let z = voxel.index[2];
+            if (lowest..=highest).contains(&z)
+                && z != sensor
                 && let Some(column) = columns.get_mut(place(voxel.index))
             {
-                *column |= 2;
+                *column |= if z > sensor { 2 } else { 4 };
             }
         }
     }
-    let free = columns.iter().filter(|&&column| column & 1 == 1).count() as u64;
-    Ok([free, columns.iter().filter(|&&column| column == 3).count() as u64])
+    Ok([1, 3, 7].map(|bits| columns.iter().filter(|&&column| column & bits == bits).count() as u64))
 }
 
 fn median(mut heights: Vec<f64>) -> Option<f64> {

@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 use voxtile::scan::PointBatch;
 use voxtile::space::{Aabb, Point};
-use voxtile::{InMemoryMapper, MapConfig, Mapper, Scan, VoxelIndex};
+use voxtile::{InMemoryMapper, MapConfig, MapView, Mapper, Scan, VoxelIndex};
 use voxtile_render::{Picture, Roof, View};
 
 const RESOLUTION_M: f64 = 0.25;
@@ -40,11 +40,11 @@ fn columns_are_those_of_a_naive_count() {
     for share in [0.0, 0.3, 1.0] {
         let (map, path) = corridor(share);
         let roof = Roof::of(&map, &path).unwrap().unwrap();
-        let (mut free, mut roofed): (HashMap<[i32; 2], bool>, HashMap<[i32; 2], bool>) = Default::default();
+        let [mut free, mut roofed, mut floored]: [HashMap<[i32; 2], bool>; 3] = Default::default();
         let tiles: Vec<[i32; 2]> =
             path.iter().map(|at| [0, 1].map(|k| (at[k] / 4.0).floor() as i32)).collect();
-        for voxel in voxtile::mapper::MapView::tile_indices(&map).into_iter().flat_map(|index| {
-            let tile = voxtile::mapper::MapView::tile_uncached(&map, index).unwrap().unwrap();
+        for voxel in map.tile_indices().into_iter().flat_map(|index| {
+            let tile = map.tile_uncached(index).unwrap().unwrap();
             tile.voxels().collect::<Vec<_>>()
         }) {
             let [x, y, z] = voxel.index;
@@ -60,9 +60,15 @@ fn columns_are_those_of_a_naive_count() {
             if z > 4 && is_occupied {
                 roofed.insert([x.div_euclid(2), y.div_euclid(2)], true);
             }
+            if z < 4 && is_occupied {
+                floored.insert([x.div_euclid(2), y.div_euclid(2)], true);
+            }
         }
         let both = free.keys().filter(|&column| roofed.contains_key(column)).count() as u64;
+        let is_room = |column: &&[i32; 2]| roofed.contains_key(*column) && floored.contains_key(*column);
+        let rooms = free.keys().filter(is_room).count() as u64;
         assert_eq!((roof.columns, roof.roofed, roof.sensor_m), (free.len() as u64, both, 1.1), "{share}");
+        assert_eq!(roof.floored, rooms, "{share}");
         assert_eq!(roof.cut_m(), (roof.share() >= 0.55).then_some(1.1));
     }
 }
@@ -75,6 +81,16 @@ fn rooms_are_cut_and_the_open_is_not() {
     // A scan from another storey: a cut would hide what it saw.
     path.push([0.0, 0.0, 5.1]);
     assert_eq!(Roof::of(&map, &path).unwrap().unwrap().cut_m(), None);
+    // Upside down: z of a camera is not up.
+    let (mut below, path) = (InMemoryMapper::new(map.config().clone()).unwrap(), vec![[10.0, 0.0, -1.1]]);
+    let ceiling = |k: i32| [0.25 * f64::from(k % 80) + 0.125, 0.25 * f64::from(k / 80) - 5.0, 3.1];
+    let points = (0..3200).map(ceiling).collect();
+    below.insert_scan(&Scan { origin: path[0], points, intensities: None }).unwrap();
+    let rest = (0..400).map(|k| [10.0 + 0.02 * f64::from(k), 5.0, -1.1]).collect();
+    below.insert_scan(&Scan { origin: path[0], points: rest, intensities: None }).unwrap();
+    let roof = Roof::of(&below, &path).unwrap().unwrap();
+    assert!(roof.share() > 0.6 && roof.columns > 10, "{roof:?}");
+    assert_eq!((roof.floored, roof.cut_m()), (0, None));
     assert_eq!(Roof::of(&map, &[]).unwrap(), None);
     assert_eq!(Roof::of(&map, &[[f64::NAN; 3], [1e300; 3]]).unwrap(), None);
     let far = Roof::of(&map, &[[500.0, 500.0, 1.0]]).unwrap().unwrap();

@@ -108,6 +108,7 @@ pub fn of_map(
         }
     } else {
         map.query_map(id).and_then(|found| match found {
+            Some(found) if *thing == Thing::Overview => Ok(Some(Answer::json(found.overview()?))),
             Some(found) => query_result(found.map(), thing, version, stop),
             None => Ok(None),
         })
@@ -159,6 +160,7 @@ fn of_levels(shown: &Shown, thing: &Thing, version: Option<u64>) -> Result<Optio
         Thing::Query(_)
         | Thing::Raycast(..)
         | Thing::Trajectory
+        | Thing::Overview
         | Thing::Moving
         | Thing::Distances(..)
         | Thing::Changes => None,
@@ -181,24 +183,40 @@ fn query_result(map: &AnyMap, thing: &Thing, version: Option<u64>, stop: &Stop) 
         | Thing::Node(..)
         | Thing::LayeredNode(..)
         | Thing::Layers
+        | Thing::Overview
         | Thing::Changes => return Ok(None),
     };
     Ok(Some(Answer::json(answer)))
 }
 
-/// Returns the number of scans, and positions and times of at most `most`, if wanted only those in a box.
+/// Returns the number of scans, and positions and times of at most `most`, if wanted only those in a box: with the
+/// index of the first position of each part of the trajectory, if there are several.
 pub fn trajectory(map: &AnyMap, most: usize, within: Option<&Aabb>) -> Result<Value> {
-    let mut scans = match map {
+    let scans = match map {
         AnyMap::Map(map) => map.scans()?,
         AnyMap::Octree(_) => Vec::new(),
     };
-    scans.retain(|scan| within.is_none_or(|within| within.contains(scan.origin_m)));
+    // A part ends where the sensor leaves the box.
+    let (mut part, mut was_within) = (0, false);
+    let within = scans.into_iter().filter_map(|scan| {
+        let is_within = within.is_none_or(|within| within.contains(scan.origin_m));
+        part += usize::from(is_within && !was_within);
+        was_within = is_within;
+        is_within.then_some((part, scan))
+    });
+    let scans: Vec<_> = within.collect();
     let step = scans.len().div_ceil(most).max(1);
     let last = scans.last().filter(|_| scans.len() % step != 1 && step > 1);
     let some: Vec<_> = scans.iter().step_by(step).chain(last).collect();
-    let points: Vec<Point> = some.iter().map(|scan| scan.origin_m).collect();
+    let points: Vec<Point> = some.iter().map(|(_, scan)| scan.origin_m).collect();
     let mut answer = json!({ "scans": scans.len(), "points": points });
-    let times_s: Option<Vec<f64>> = some.iter().map(|scan| Some(scan.stamp_ns? as f64 * 1e-9)).collect();
+    let firsts: Vec<usize> = (0..some.len())
+        .filter(|&k| k.checked_sub(1).is_none_or(|before| some[before].0 != some[k].0))
+        .collect();
+    if firsts.len() > 1 {
+        answer["parts"] = firsts.into();
+    }
+    let times_s: Option<Vec<f64>> = some.iter().map(|(_, scan)| Some(scan.stamp_ns? as f64 * 1e-9)).collect();
     if let Some(times_s) = times_s.filter(|times_s| !times_s.is_empty()) {
         answer["is_unix_time"] = times_s.iter().copied().all(is_unix_time).into();
         answer["times_s"] = times_s.into();

@@ -6,6 +6,7 @@
 use super::answers::{TRAJECTORY, described, extent_m, name_of, trajectory};
 use super::map_state::layer_legends;
 use super::moving::moving_within;
+use super::overview::overview;
 use super::{node_cache, page};
 use anyhow::Context;
 use rayon::prelude::*;
@@ -159,7 +160,9 @@ impl MapFolder<'_> {
         let count = self.write_nodes(&levels, &store, nodes.finest())?;
         self.write_json("layers.json", layer_legends(&levels, map, &store)?)?;
         let within = region.map(|region| extent_m(region, map.config().grid.tile_size_m()));
-        self.write_json("trajectory.json", trajectory(map, TRAJECTORY, within.as_ref())?)?;
+        let trajectory = trajectory(map, TRAJECTORY, within.as_ref())?;
+        self.write_json("trajectory.json", trajectory.clone())?;
+        self.write_json("overview.json", overview(map, &tiles, within.as_ref())?)?;
         self.write_file("moving.bin", &moving_within(map, None, within.as_ref())?)?;
         let mut description = described(self.number, &name_of(path), map, &tiles);
         let unreadable = levels.unreadable().to_vec();
@@ -170,6 +173,9 @@ impl MapFolder<'_> {
             ("unreadable", json!(unreadable)),
         ] {
             description[name] = value;
+        }
+        if within.is_some() {
+            description["scans"] = trajectory["scans"].clone();
         }
         let finest = nodes.finest();
         Ok(WrittenMap { description, finest, tiles: tiles.len() as u64, nodes: count, unreadable })

@@ -8,6 +8,7 @@
 //!         -> answers   JSON of a query, a tileset, bytes of a node  answers
 //!                      points of kept scans that are marked         moving
 //!                      distances of a layer of voxels               distance_slice
+//!                      ceiling and range of heights                 overview
 //!         -> metrics   text for Prometheus                          view_metrics
 //!            ServedMap one map that another process may write       served_map
 //!            comparison  classes of the voxels of two maps      comparison
@@ -27,6 +28,7 @@ mod export_page;
 mod map_state;
 mod moving;
 mod node_cache;
+mod overview;
 mod page;
 mod response;
 mod route;

@@ -1,5 +1,6 @@
+use super::overview::overview;
 use serde_json::json;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 use voxtile::Result;
 use voxtile::mapper::MapView;
 use voxtile_pipeline::AnyMap;
@@ -19,6 +20,8 @@ pub struct MapState {
     pub generation: u64,
     /// Number of tiles that are not in the coarse levels of detail yet.
     pub pending_tiles: u64,
+    /// `overview.json`, once it was requested.
+    pub overview: OnceLock<serde_json::Value>,
 }
 
 /// One state, or the changes between two.
@@ -39,6 +42,18 @@ impl QueryMap {
             Self::State(state) => &state.map,
             Self::Opened(map) => map,
         }
+    }
+
+    /// Returns `overview.json`.
+    pub fn overview(&self) -> Result<serde_json::Value> {
+        let map = self.map();
+        let computed = || overview(map, &map.tile_indices(), None);
+        let Self::State(state) = self else { return computed() };
+        if let Some(known) = state.overview.get() {
+            return Ok(known.clone());
+        }
+        let value = computed()?;
+        Ok(state.overview.get_or_init(|| value).clone())
     }
 }
 

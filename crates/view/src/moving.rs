@@ -41,7 +41,7 @@ pub fn moving(map: &AnyMap, known: Option<u64>) -> Result<Vec<u8>> {
     moving_within(map, known, None)
 }
 
-/// As [`moving`], for the points in a box.
+/// As [`moving`], for the points in a box, which are counted.
 pub fn moving_within(map: &AnyMap, known: Option<u64>, within: Option<&Aabb>) -> Result<Vec<u8>> {
     let (mut marks, mut thinned) = (Marks::none(), Thinned::new());
     if let AnyMap::Map(map) = map
@@ -49,15 +49,20 @@ pub fn moving_within(map: &AnyMap, known: Option<u64>, within: Option<&Aabb>) ->
     {
         marks = Marks::of(map)?;
         if known != Some(marks.version) {
-            thinned = read(map, marks.points_to_read, MAX_POINTS_READ, within)?;
+            let every = marks.every(MAX_POINTS_READ);
+            thinned = read(map, every, within)?;
+            if within.is_some() {
+                // An estimate, if not all scans are read.
+                marks.points = thinned.offered.saturating_mul(every);
+            }
         }
     }
     Ok(gzip(&bytes_of(&marks, &thinned)))
 }
 
-/// Reads the marked points; if the scans that have some have more than `max_points` points, only of every n-th of them.
-fn read(map: &MapReader, points: u64, max_points: u64, within: Option<&Aabb>) -> Result<Thinned> {
-    let (every, mut number) = (points.div_ceil(max_points).max(1), 0);
+/// Reads the marked points, of every n-th of the scans that have some.
+fn read(map: &MapReader, every: u64, within: Option<&Aabb>) -> Result<Thinned> {
+    let mut number = 0;
     let is_wanted = |_: &KeptRecord| {
         number += 1;
         (number - 1) % every == 0
@@ -87,6 +92,11 @@ fn bytes_of(marks: &Marks, thinned: &Thinned) -> Vec<u8> {
 impl Marks {
     fn none() -> Self {
         Self { keeps_scans: false, points: 0, points_to_read: 0, version: 0 }
+    }
+
+    /// Of how many scans with marks one is read, to read some `max_points` points.
+    fn every(&self, max_points: u64) -> u64 {
+        self.points_to_read.div_ceil(max_points).max(1)
     }
 
     fn of(map: &MapReader) -> Result<Self> {
@@ -141,6 +151,7 @@ impl Thinned {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::io::Read;
     use voxtile::mapper::OutOfCoreTileMapper;
     use voxtile::operations::{Replay, mark_moving};
     use voxtile::scan::MovingMarks;
@@ -169,12 +180,18 @@ mod tests {
         let marks = Marks::of(&map).unwrap();
         assert_eq!((marks.points, marks.points_to_read), (15, 50));
         assert_ne!(marks.version, before.version);
-        let all = read(&map, marks.points_to_read, 50, None).unwrap();
+        let all = read(&map, marks.every(50), None).unwrap();
         let rows = |thinned: &Thinned| thinned.points.iter().map(|[_, y, _]| *y).collect::<Vec<f32>>();
         assert_eq!(rows(&all), [0.0, 2.0, 4.0, 6.0, 8.0].map(|y| [y; 3]).concat());
         assert_eq!(all.origin_m, [5.0, 0.0, 7.0]);
-        let half = read(&map, marks.points_to_read, 49, None).unwrap();
+        let half = read(&map, marks.every(49), None).unwrap();
         assert_eq!(rows(&half), [0.0, 4.0, 8.0].map(|y| [y; 3]).concat());
+        // Those in a box are counted.
+        let within = Aabb { min: [0.0; 3], max: [9.0, 3.0, 8.5] };
+        let bytes = moving_within(&AnyMap::Map(Box::new(map)), None, Some(&within)).unwrap();
+        let mut plain = Vec::new();
+        flate2::read::GzDecoder::new(&bytes[..]).read_to_end(&mut plain).unwrap();
+        assert_eq!([4, 8].map(|at| plain[at]), [4; 2], "two points of each of the first two scans");
     }
 
     #[test]

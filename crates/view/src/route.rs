@@ -47,6 +47,8 @@ pub enum Thing {
     Query(Point),
     Raycast(Point, Point),
     Trajectory,
+    /// Height of the ceiling, and range of the heights.
+    Overview,
     /// Points of kept scans that are marked as moving.
     Moving,
     /// Distances to obstacles in the layer of a point, and their cap in metres.
@@ -80,9 +82,9 @@ impl Route {
 }
 
 impl Thing {
-    /// Returns whether the resource needs points of kept scans.
-    pub fn takes_scans(&self) -> bool {
-        matches!(self, Self::Moving)
+    /// Returns whether the resource needs points of kept scans or many tiles.
+    pub fn reads_much(&self) -> bool {
+        matches!(self, Self::Moving | Self::Overview)
     }
 
     /// Returns whether the resource needs the computation of distances.
@@ -108,6 +110,7 @@ impl Thing {
         match path {
             "tileset.json" => Some(Self::Tileset),
             "trajectory.json" => Some(Self::Trajectory),
+            "overview.json" => Some(Self::Overview),
             "layers.json" => Some(Self::Layers),
             "changes.json" => Some(Self::Changes),
             "moving.bin" => Some(Self::Moving),
@@ -215,6 +218,8 @@ mod tests {
         assert_eq!(query, Some(Route::Of(now.clone(), Thing::Query([1.0, -2.5, 30.0]))));
         let ray = route("/sesame_42/maps/1/raycast", Some("from=0,0,0&to=1%2C2,3"));
         assert_eq!(ray, Some(Route::Of(now, Thing::Raycast([0.0; 3], [1.0, 2.0, 3.0]))));
+        let overview = route("/sesame_42/maps/0@b/overview.json", None);
+        assert!(matches!(overview, Some(Route::Of(_, Thing::Overview))), "{overview:?}");
         let moving = route("/sesame_42/maps/0@b/moving.bin", Some("v=00ff"));
         assert!(matches!(moving, Some(Route::Of(_, Thing::Moving))), "{moving:?}");
         let distances = route("/sesame_42/maps/0/distances.bin", Some("at=1,2,3&cap=0.5"));

@@ -9,7 +9,7 @@ use anyhow::Context;
 use parking_lot::{Mutex, RwLock};
 use std::hash::{BuildHasher, Hasher, RandomState};
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 use std::thread;
 use std::time::{Duration, Instant, SystemTime};
 use tokio::sync::watch;
@@ -96,7 +96,14 @@ impl ServedMap {
         let levels = Levels::build(&map, &[], 0, &store, &|_| true)?;
         let levels = levels.context("the levels of a map without tiles")?;
         let pending_tiles = map.tile_indices().len() as u64;
-        let now = MapState { map, levels, store: store.clone(), generation: 0, pending_tiles };
+        let now = MapState {
+            map,
+            levels,
+            store: store.clone(),
+            generation: 0,
+            pending_tiles,
+            overview: OnceLock::new(),
+        };
         Ok(Self {
             path: path.to_owned(),
             at: MapAt::of(path)?,
@@ -228,7 +235,14 @@ impl ServedMap {
         let Some(levels) = Levels::build(&map, &tiles, new_origin(), &self.store, &|_| true)? else {
             return Ok(None);
         };
-        let state = MapState { map, levels, store: self.store.clone(), generation: 0, pending_tiles: 0 };
+        let state = MapState {
+            map,
+            levels,
+            store: self.store.clone(),
+            generation: 0,
+            pending_tiles: 0,
+            overview: OnceLock::new(),
+        };
         Ok(Some(Arc::new(state)))
     }
 
@@ -296,7 +310,14 @@ impl ServedMap {
             log::warn!("tile not shown: {reason}");
         }
         let generation = self.now().generation + 1;
-        let state = MapState { map, levels, store: self.store.clone(), generation, pending_tiles };
+        let state = MapState {
+            map,
+            levels,
+            store: self.store.clone(),
+            generation,
+            pending_tiles,
+            overview: OnceLock::new(),
+        };
         *self.now.write() = Arc::new(state);
         changes.send_modify(|count| *count += 1);
     }

@@ -51,7 +51,7 @@ pub struct Server {
     work: Work,
     /// Builds levels of snapshots, one at a time on all cores. This takes seconds, so it must not block other work.
     making: Work,
-    /// Reads kept scans, for one response at a time. This takes seconds, too.
+    /// Reads kept scans or many tiles, for one response at a time. This takes seconds, too.
     reading: Work,
     /// Computes distances on all cores, for one response at a time.
     measuring: Work,
@@ -251,7 +251,7 @@ impl Server {
             move || answers::of_map(&server.maps, comparison.as_deref(), &id, &thing, version, makes, &stop)
         };
         let first = match &thing {
-            thing if thing.takes_scans() => &self.reading,
+            thing if thing.reads_much() => &self.reading,
             thing if thing.takes_distances() => &self.measuring,
             _ => &self.work,
         };

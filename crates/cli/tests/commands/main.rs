@@ -64,5 +64,15 @@ mod registered_clouds;
 /// `view`, tested through its server.
 #[cfg(all(feature = "view", target_os = "linux"))]
 mod view;
+/// Clients of the server.
+#[cfg(all(feature = "view", target_os = "linux"))]
+mod view_clients;
 /// `view --export-page`.
+#[cfg(all(feature = "view", target_os = "linux"))]
 mod view_export;
+/// Flushes, snapshots and changes.
+#[cfg(all(feature = "view", target_os = "linux"))]
+mod view_states;
+/// Runs the server.
+#[cfg(all(feature = "view", target_os = "linux"))]
+mod viewer;

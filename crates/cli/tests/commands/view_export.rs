@@ -1,6 +1,6 @@
 //! `voxtile view --export-page` writes what the server shows.
 
-use crate::view::{Viewer, a_map, run, text};
+use crate::viewer::{Viewer, a_map, run, text};
 use assert_cmd::cargo::cargo_bin;
 use serde_json::{Value, json};
 use std::collections::BTreeSet;
@@ -52,8 +52,8 @@ fn named(folder: &Path) -> (BTreeSet<String>, u32) {
 fn assert_complete(folder: &Path) -> u32 {
     let (named, finest) = named(folder);
     let fixed = ["index.html", "page.js", "page.css", "licences.txt", "maps.json"].map(str::to_owned);
-    let of_map =
-        ["tileset.json", "layers.json", "trajectory.json", "moving.bin"].map(|name| format!("maps/0/{name}"));
+    let of_map = ["tileset.json", "layers.json", "trajectory.json", "overview.json", "moving.bin"];
+    let of_map = of_map.map(|name| format!("maps/0/{name}"));
     let is_plain = |file: &String| !file.contains(".colour.") && !file.contains(".class.");
     let found: BTreeSet<String> = files(folder).into_iter().filter(is_plain).collect();
     assert_eq!(found, named.into_iter().chain(fixed).chain(of_map).collect());
@@ -92,7 +92,10 @@ fn an_exported_page_has_the_files_of_the_server() {
         }
     }
     assert!(summary["nodes"].as_u64().unwrap() <= nodes.len() as u64);
-    assert_eq!(json_in(&page.join("maps/0/trajectory.json")), viewer.json("maps/0/trajectory.json"));
+    for name in ["trajectory", "overview"] {
+        let path = format!("maps/0/{name}.json");
+        assert_eq!(json_in(&page.join(&path)), viewer.json(&path), "{name}");
+    }
     let (mut live, exported) = (viewer.json("maps.json"), json_in(&page.join("maps.json")));
     assert_eq!(exported["exported"], json!({ "finest_level": 0 }));
     live["maps"][0]["generation"] = 1.into();
@@ -152,6 +155,31 @@ fn a_page_of_a_region_or_without_fine_levels_is_smaller() {
     ]);
     assert!(error.contains("--region") && error.contains("no tile"), "{error}");
     assert!(!folder.path().join("none").exists());
+}
+
+#[test]
+fn a_page_of_a_region_has_the_trajectory_inside() {
+    let folder = tempfile::tempdir().unwrap();
+    let (scans, map, page) =
+        (folder.path().join("scans"), folder.path().join("map"), folder.path().join("page"));
+    fs::create_dir(&scans).unwrap();
+    // Along x, out of the region and back again.
+    let poses = [0.0, 2.0, 4.0, 30.0, 34.0, 6.0, 8.0, 40.0].into_iter().enumerate().map(|(k, x)| {
+        fs::write(scans.join(format!("{k}.xyz")), "4 0 0.5\n4 0.5 0.5\n").unwrap();
+        format!("{k} {x} 0 0 0 0 0 1\n")
+    });
+    fs::write(scans.join("poses_tum.txt"), poses.collect::<String>()).unwrap();
+    run(&["build", text(&scans), "-o", text(&map), "--resolution", "0.1", "-q"]);
+    let region = ["--region", "-20", "-20", "-20", "20", "20", "20"];
+    run(&[&["view", text(&map), "--export-page", text(&page), "-q"], &region[..]].concat());
+    let trajectory = json_in(&page.join("maps/0/trajectory.json"));
+    assert_eq!((&trajectory["scans"], &trajectory["parts"]), (&json!(5), &json!([0, 3])));
+    assert_eq!(json_in(&page.join("maps.json"))["maps"][0]["scans"], 5);
+    let whole = folder.path().join("whole");
+    run(&["view", text(&map), "--export-page", text(&whole), "-q"]);
+    assert!(json_in(&whole.join("maps/0/trajectory.json")).get("parts").is_none());
+    let error = refusal(&["view", text(&map), "--export-page", text(&whole), "--compare", text(&map)]);
+    assert!(error.contains("--export-page") && error.contains("--compare"), "{error}");
 }
 
 #[test]

@@ -16,6 +16,8 @@ export class Browser {
     this.waiting = new Map();
     this.number = 0;
     this.errors = [];
+    // Receives all messages.
+    this.listener = null;
     let rest = '';
     this.process.stdio[4].on('data', (data) => {
       const parts = (rest + data).split('\0');
@@ -33,6 +35,7 @@ export class Browser {
       const { text, url } = message.params.entry;
       this.errors.push(`${text} ${url ?? ''}`);
     }
+    this.listener?.(message);
     const waits = this.waiting.get(message.id);
     if (!waits) return;
     this.waiting.delete(message.id);

@@ -4,10 +4,12 @@
 //
 // Jumps to places along the trajectory, or over the map without one, in a fixed order; most jumps are left after 100 ms, as
 // a flight leaves a place. Prints the heap of JavaScript after a collection, and the buffers of WebGL, ten times. Then
-// waits for SHARP views at the height of a street, each until no node is missing. PAGE is the URL of a page that is served
-// already, instead of VOXTILE.
+// waits for SHARP views at the height of a street, each until no node is missing and the frame is drawn. Prints the
+// maximum memory of the server. PAGE is the URL of a page that is served already, instead of VOXTILE, and SERVER its
+// process.
 
 import { spawn } from 'node:child_process';
+import { readFileSync } from 'node:fs';
 import { createInterface } from 'node:readline';
 import { Browser } from './browser.mjs';
 
@@ -85,11 +87,14 @@ try {
     await look(place(), 20);
     await browser.until('document.getElementById("state").textContent === "loading"', 5).catch(() => {});
     await browser.ready(120);
+    await browser.value('voxtile.finish()');
     times.push((performance.now() - start) / 1000);
   }
   times.sort((a, b) => a - b);
   const share = (at) => +times[Math.min(Math.floor(at * times.length), times.length - 1)].toFixed(2);
-  console.log(JSON.stringify({ sharp: { jumps: times.length, median_s: share(0.5), p90_s: share(0.9), most_s: share(1) } }));
+  if (times.length) console.log(JSON.stringify({ sharp: { jumps: times.length, median_s: share(0.5), p90_s: share(0.9), most_s: share(1) } }));
+  const [, peak] = /VmHWM:\s*(\d+) kB/.exec(readFileSync(`/proc/${server?.pid ?? process.env.SERVER}/status`, 'utf8'));
+  console.log(JSON.stringify({ server_peak_mib: +(peak / 1024).toFixed(1) }));
 } finally {
   await browser.close();
   server?.kill();

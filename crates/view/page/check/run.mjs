@@ -9,7 +9,9 @@ import { Browser } from './browser.mjs';
 import { checkChanges } from './changes.mjs';
 import { checkColours } from './colours.mjs';
 import { checkExported } from './exported.mjs';
+import { checkJumps } from './jumps.mjs';
 import { checkPeople } from './people.mjs';
+import { checkRooms } from './rooms.mjs';
 import { checkOpacity, checkTools } from './tools.mjs';
 
 const voxtile = process.env.VOXTILE;
@@ -169,6 +171,8 @@ checks: try {
     run('build', scan(0), '-o', map, '--resolution', '0.1', '-q');
     run('build', scan(7), '-o', map, '--append', '-q');
     step(await checkTools({ browser, view, map, run, exported, work }));
+  step(await checkJumps({ browser, view, run, work }));
+  step(await checkRooms({ browser, view, run, exported, work }));
     step(await checkPeople({ browser, url: await view(map) }));
     run('build', scan(1), '-o', join(work, 'other'), '--resolution', '0.1', '-q');
     await browser.open('about:blank');
@@ -438,6 +442,8 @@ checks: try {
   step(await checkPeople({ browser, url }));
   const running = server;
   step(await checkTools({ browser, view, map, run, exported, work }));
+  step(await checkJumps({ browser, view, run, work }));
+  step(await checkRooms({ browser, view, run, exported, work }));
   server = running;
   await browser.open('about:blank');
   await browser.open(url);

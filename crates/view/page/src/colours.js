@@ -5,7 +5,7 @@ import { paintDistances } from './distance_slice.js';
 import { $, json, metres, say, swatchOf, tell } from './dom.js';
 import { BY_LAYER, className, endsOf, joined, NO_VALUE } from './layers.js';
 import { RETRY_MS } from './live.js';
-import { allBounds, ceiling } from './maps.js';
+import { allBounds, ceiling, heightsOf } from './maps.js';
 import { logOddsOf, observationsOf, probabilityOf } from './node.js';
 import { centerOf } from './pick.js';
 import { CHANGES, chooseColours, drawLegend } from './palette.js';
@@ -82,11 +82,11 @@ function paintLegend(range) {
 }
 
 // Heights of all voxels, and of most: from the 2nd to the 98th percentile.
-function heightsOf() {
+function heightScale() {
   const of = (least, end, from) => least(...app.maps.map((map) => from(map)?.[end]).filter(Number.isFinite));
   const both = (from) => [of(Math.min, 0, from), of(Math.max, 1, from)];
   const domain = both((map) => [map.low, map.high]);
-  const range = both((map) => map.survey?.heights ?? [map.low, map.high]);
+  const range = both(heightsOf);
   return { domain, range: [Math.max(range[0], domain[0]), Math.min(range[1], domain[1], ceiling() ?? Infinity)] };
 }
 
@@ -124,7 +124,7 @@ function colourScale() {
   const counts = app.maps.map((map) => map.survey?.counts).filter(Boolean);
   const [low, high] = app.legend?.range ?? [0, 1];
   const scales = {
-    height: { ...heightsOf(), texts: (range) => range.map(metres) },
+    height: { ...heightScale(), texts: (range) => range.map(metres) },
     above: { ...(viewer.colour === 'above' ? aboveOf() : {}), texts: (range) => range.map(metres) },
     probability: { domain: [0, 255], texts: (range) => range.map((value) => probabilityOf(logOddsOf(scale, value)).toFixed(2)) },
     count: {
@@ -157,7 +157,7 @@ export function paint() {
   $('colours').hidden = comparison.isShown;
   const { domain, range, texts } = colourScale();
   viewer.range = range;
-  viewer.heights = viewer.colour === 'height' ? range : heightsOf().range;
+  viewer.heights = viewer.colour === 'height' ? range : heightScale().range;
   const wide = Math.max(domain[1] - domain[0], 1e-9);
   const shares = range.map((value) => (value - domain[0]) / wide);
   ['range-low', 'range-high'].forEach((id, k) => { $(id).value = Math.round(1000 * shares[k]); });

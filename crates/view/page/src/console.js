@@ -2,6 +2,7 @@ import { app, viewer } from './app.js';
 import { paint } from './colours.js';
 import { $ } from './dom.js';
 import { BY_LAYER } from './layers.js';
+import { cache } from './loading.js';
 import { centerOf } from './pick.js';
 import { clickAt } from './query.js';
 import { sectionShown } from './section.js';
@@ -32,9 +33,10 @@ window.voxtile = {
   },
   // What the view waits for.
   waits: () => viewer.layers.map(({ tiles, adapts, next, waits }) => ({ ...tiles.stats, calm: tiles.calm, errorTarget: tiles.errorTarget, adapts, waits, hasNext: Boolean(next), shown: tiles.visibleTiles.size })),
+  get frames() { return viewer.frames; },
   drawCalls: () => viewer.renderer.info.render.calls,
   mostDrawCalls: () => viewer.mostCalls,
-  bytes: () => viewer.layers.reduce((sum, layer) => sum + layer.bytes, 0),
+  bytes: () => cache.cachedBytes + viewer.layers.reduce((sum, layer) => sum + layer.nearBytes, 0),
   moving() {
     const { offsets, origin } = app.moving;
     return Array.from({ length: app.moving.count }, (_, k) => origin.map((at, axis) => at + offsets[3 * k + axis]));
@@ -43,6 +45,8 @@ window.voxtile = {
   distances: () => app.distances && { ...app.distances, values: [...app.distances.values] },
   clickAt,
   draw: () => viewer.draw(),
+  // Waits until the last frame is drawn.
+  finish: () => viewer.renderer.getContext().readPixels(0, 0, 1, 1, 6408, 5121, new Uint8Array(4)),
   screenOf(point) {
     const at = viewer.camera.position.clone().set(...viewer.toScene(point)).project(viewer.camera);
     const { left, top, width, height } = $('scene').getBoundingClientRect();

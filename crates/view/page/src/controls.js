@@ -2,7 +2,7 @@
 
 import { app, comparison, ground, viewer } from './app.js';
 import { colour, paint } from './colours.js';
-import { cut } from './cut.js';
+import { applyOverviews, cut } from './cut.js';
 import { followCamera } from './distance_slice.js';
 import { $ } from './dom.js';
 import { showPanel } from './drawer.js';
@@ -36,11 +36,16 @@ $('grid').addEventListener('change', () => {
   else viewer.overlays.set('grid', null);
   viewer.wake();
 });
-for (const id of ['snapshot', 'since', 'swiped']) $(id).addEventListener('change', showMaps);
+for (const id of ['snapshot', 'since', 'swiped']) {
+  $(id).addEventListener('change', () => {
+    showMaps();
+    applyOverviews();
+  });
+}
 $('compared').addEventListener('change', async () => {
   await readCompared();
   showMaps();
-  cut();
+  applyOverviews();
 });
 
 $('shot').addEventListener('click', () => {

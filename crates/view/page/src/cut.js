@@ -2,9 +2,10 @@
 
 import { app, comparison, viewer } from './app.js';
 import { drawBox } from './box.js';
+import { paint } from './colours.js';
 import { layerHeight } from './distance_slice.js';
 import { $, metres, say, tell } from './dom.js';
-import { allBounds, ceiling } from './maps.js';
+import { allBounds, ceiling, readOverviews, surround } from './maps.js';
 import { drawSection } from './section.js';
 import { remember } from './view_link.js';
 
@@ -67,6 +68,15 @@ export function cut() {
   drawSection();
   viewer.wake();
   remember();
+}
+
+// Applies the ceilings and the heights of what is shown.
+export async function applyOverviews(overviews = readOverviews()) {
+  cut();
+  await overviews;
+  surround();
+  cut();
+  paint();
 }
 
 for (const id of CUTS) $(id).addEventListener('input', cut);

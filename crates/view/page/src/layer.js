@@ -1,33 +1,24 @@
 import * as THREE from 'three';
-import { FAILED, PriorityQueue, TilesRenderer } from '3d-tiles-renderer';
+import { FAILED, TilesRenderer } from '3d-tiles-renderer';
 import { contentOf, plain } from './content.js';
 import { BY_LAYER } from './layers.js';
+import { cache, queues } from './loading.js';
 import { KIND, parseNode } from './node.js';
 import { bytesOf, meshOf } from './mesh.js';
 import { makeMaterial, tintLayer } from './material.js';
 
-const MOST_BYTES = 256 * 2 ** 20;
 const MOST_DRAWN = 180;
+// Nodes of loaded files that take part in an update at once.
+const MOST_PROCESSED = 5000;
 const BEST_ERROR = 2;
 const MOST_ERROR = 4096;
+// Factor between levels of detail.
+const STEP = 1.07;
 // Maximum number of tiles with free or unknown voxels.
 const MOST_NEAR = 24;
 // Failed requests are retried with increasing delay.
 const FIRST_RETRY_MS = 2000;
 const LAST_RETRY_MS = 60000;
-
-// Decodes nodes between frames. By default, the renderer decodes five in each frame, which takes a minute after a jump
-// where frames are slow.
-class DecodeQueue extends PriorityQueue {
-  scheduleJobRun() {
-    if (this.scheduled) return;
-    this.scheduled = true;
-    setTimeout(() => {
-      this.scheduled = false;
-      this.tryRunJobs();
-    });
-  }
-}
 
 // One state of a map; nodes are loaded and removed as the camera moves.
 export class Layer {
@@ -57,8 +48,7 @@ export class Layer {
     const tiles = new TilesRenderer(`maps/${this.id}/tileset.json`);
     const { legend } = this;
     tiles.layerName = legend && this.layerName;
-    const { priorityCallback } = tiles.parseQueue;
-    tiles.parseQueue = Object.assign(new DecodeQueue(), { priorityCallback });
+    Object.assign(tiles, queues, { maxTilesProcessed: MOST_PROCESSED });
     tiles.errorTarget = BEST_ERROR;
     tiles.registerPlugin({
       preprocessURL: (url) => {
@@ -86,7 +76,10 @@ export class Layer {
     tiles.setResolutionFromRenderer(this.viewer.camera, this.viewer.renderer);
     tiles.lost = new Set();
     tiles.addEventListener('load-error', ({ tile, error }) => this.lose(tiles, tile, error));
-    tiles.addEventListener('needs-update', () => this.viewer.wakeSoon());
+    tiles.addEventListener('needs-update', () => {
+      this.viewer.loadSoon();
+      this.viewer.wakeSoon();
+    });
     this.group.add(tiles.group);
     return tiles;
   }
@@ -184,32 +177,51 @@ export class Layer {
     this.updateNear();
   }
 
+  // Number of nodes that the view needs at the level of detail, with those that are not loaded yet.
+  get needed() {
+    const { usedSet, errorTarget } = this.tiles;
+    let count = this.near.children.length;
+    for (const tile of usedSet) {
+      const { used, inFrustum, error } = tile.traversal;
+      if (!used || !inFrustum || (error > errorTarget && tile.children.length > 0)) continue;
+      // Finer nodes that are shown until their parent is loaded do not count.
+      let { parent } = tile;
+      while (parent?.internal.hasUnrenderableContent) ({ parent } = parent);
+      if (!parent || parent.traversal.error > errorTarget) count++;
+    }
+    return count;
+  }
+
   // Keeps draw calls and memory within limits by selecting coarser levels; `adapts` is true until the level is stable.
   // `others` have the same level.
-  adapt(others) {
+  adapt(others, isFrame) {
     const { tiles, viewer } = this;
     const all = [this, ...others];
-    const opened = viewer.layers.reduce((sum, layer) => sum + (layer.next ? 2 : 1), 0);
-    for (const one of all.flatMap((layer) => [layer.tiles, layer.next])) {
-      if (!one) continue;
-      one.lruCache.maxBytesSize = MOST_BYTES / opened;
-      one.lruCache.minBytesSize = 0.75 * one.lruCache.maxBytesSize;
-    }
     // Does not retry a level that was too fine until the view changes, to avoid flicker.
     const view = [...viewer.camera.matrixWorld.elements, viewer.canvas.width, viewer.canvas.height].join();
     if (view !== this.view) [this.view, this.finest] = [view, BEST_ERROR];
-    const before = tiles.errorTarget;
     const share = MOST_DRAWN / viewer.layers.length;
-    const drawn = Math.max(...all.map((layer) => layer.tiles.visibleTiles.size + layer.near.children.length));
-    if (drawn > share || all.some((layer) => layer.tiles.lruCache.isFull())) {
-      tiles.errorTarget = this.finest = Math.min(1.15 * before, MOST_ERROR);
-    } else if (drawn < 0.6 * share && all.every((layer) => layer.tiles.calm > 0)) {
-      tiles.errorTarget = Math.max(Math.min(this.finest, before), before / 1.15);
+    const before = tiles.errorTarget;
+    let isFull = isFrame && cache.isFull();
+    for (;;) {
+      const { errorTarget } = tiles;
+      const needed = Math.max(...all.map((layer) => layer.needed));
+      if (needed > share || isFull) tiles.errorTarget = this.finest = Math.min(STEP * errorTarget, MOST_ERROR);
+      else if (needed < 0.6 * share) tiles.errorTarget = Math.max(Math.min(this.finest, errorTarget), errorTarget / STEP);
+      isFull = false;
+      if (tiles.errorTarget === errorTarget) break;
+      for (const layer of all) layer.select(tiles.errorTarget);
     }
     const adapts = tiles.errorTarget !== before;
-    for (const layer of all) {
-      layer.tiles.errorTarget = tiles.errorTarget;
-      layer.adapts = adapts;
+    for (const layer of all) layer.adapts = adapts;
+  }
+
+  // Selects the nodes of a level of detail. Requests of nodes that are not needed any more are cancelled.
+  select(errorTarget) {
+    for (const tiles of [this.tiles, this.next]) {
+      if (!tiles) continue;
+      tiles.errorTarget = errorTarget;
+      tiles.update();
     }
   }
 
@@ -233,9 +245,9 @@ export class Layer {
     return Layer.isQuiet(this.tiles) && !this.adapts && !this.next && !this.waits;
   }
 
-  get bytes() {
-    const near = this.near.children.reduce((sum, { userData }) => sum + bytesOf(userData.node, userData.faces), 0);
-    return this.tiles.lruCache.cachedBytes + (this.next?.lruCache.cachedBytes ?? 0) + near;
+  // Memory of free and unknown voxels in bytes.
+  get nearBytes() {
+    return this.near.children.reduce((sum, { userData }) => sum + bytesOf(userData.node, userData.faces), 0);
   }
 
   meshes() {

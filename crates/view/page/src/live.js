@@ -2,13 +2,13 @@
 
 import { app, viewer } from './app.js';
 import { loadLegend, paint } from './colours.js';
-import { cut } from './cut.js';
+import { applyOverviews, cut } from './cut.js';
 import { loadDistances } from './distance_slice.js';
 import { $, say } from './dom.js';
 import { readExtents, readMaps, showMaps, states, surround } from './maps.js';
 import { loadMoving } from './moving_points.js';
 import { readPath } from './trajectory.js';
-import { start } from './views.js';
+import { isAtStart, start } from './views.js';
 
 export const RETRY_MS = 1000;
 // Latest generation of each map, as reported by the server. A restarted server counts from 0 again.
@@ -53,7 +53,8 @@ async function change() {
     }
   }
   const changed = before.filter((was) => app.maps.some(({ id, generation }) => id === was.id && generation !== was.generation));
-  if (changed.some(({ generation, low, high }) => generation === 0 || low === high)) start();
+  // While the map is read for the first time, its box grows.
+  if (changed.some(({ generation, low, high, pending_tiles: pending }) => generation === 0 || low === high || (pending > 0 && isAtStart()))) start();
   else surround();
   // While the map is read for the first time, its new generations are not flushes.
   if (changed.some((was) => was.pending_tiles === 0 && was.generation > 0)) {
@@ -62,8 +63,8 @@ async function change() {
   }
   cut();
   paint();
-  // The ceiling depends on the trajectory.
-  readPath().then(cut);
+  readPath();
+  applyOverviews();
   loadMoving();
   loadDistances();
 }

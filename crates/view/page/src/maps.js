@@ -8,7 +8,7 @@ import { BY_LAYER } from './layers.js';
 import { catchUp } from './live.js';
 import { loadMoving } from './moving_points.js';
 import { LAYERS } from './palette.js';
-import { ceilingOf, survey } from './survey.js';
+import { survey } from './survey.js';
 import { sidesOf } from './swipe.js';
 import { readPath } from './trajectory.js';
 
@@ -77,7 +77,10 @@ function describe() {
 
 export async function readMaps() {
   const listed = await json('maps.json');
+  const before = app.maps;
   app.maps = comparison.mapsOf(listed);
+  // Until it is read again.
+  for (const map of app.maps) map.overview = before.find(({ id }) => id === map.id)?.overview ?? null;
   if (app.colourMaps.length === 0) {
     app.colourMaps = listed.color_maps;
     $('ramp').replaceChildren(...app.colourMaps.map(({ name }) => new Option(name, name)));
@@ -133,18 +136,29 @@ export function mostOf() {
   return [{ min: end('min', Math.min), max: end('max', Math.max) }, points];
 }
 
+// Returns the heights of most voxels of a map.
+export const heightsOf = (map) => map.overview?.heights_m ?? map.survey?.heights ?? [map.low, map.high];
+
+// Reads the ceilings of rooms, and the heights of most voxels.
+export async function readOverviews() {
+  await Promise.all(app.maps.map(async (map) => {
+    const id = idOf(map).split('~')[0];
+    const found = await json(`maps/${id}/overview.json`).catch(() => null);
+    // Ignore the response to an older request.
+    if (found && id === idOf(map).split('~')[0]) map.overview = found;
+  }));
+}
+
 export function surround() {
   viewer.surround(allBounds(), ...mostOf());
-  const heights = app.maps.map((map) => map.survey?.heights?.[0] ?? map.low);
+  const heights = app.maps.map((map) => heightsOf(map)[0]);
   ground.height = Math.min(...heights);
   ground.name(app.maps[0]?.crs);
 }
 
 // Returns the height above which the ceiling is hidden; `null` for maps without one, and if it is shown.
 export function ceiling() {
-  const one = app.maps.length === 1 && !app.showsCeiling && !comparison.info ? app.maps[0].survey : null;
-  if (one && one.path !== app.path) [one.path, one.ceiling] = [app.path, ceilingOf(one, app.path)];
-  const at = one?.ceiling ?? null;
+  const at = app.maps.length === 1 && !app.showsCeiling && !comparison.info ? app.maps[0].overview?.ceiling_m ?? null : null;
   $('ceiling').hidden = at === null;
   return at;
 }

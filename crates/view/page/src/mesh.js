@@ -14,33 +14,102 @@ function quadsOf(count) {
   return quads;
 }
 
-// Returns an attribute with a copy of each four bytes for each corner of a face.
-function ofCorners(bytes, isNormalized = false) {
-  const faces = new Uint32Array(bytes.buffer);
-  const corners = new Uint32Array(4 * faces.length);
-  for (let k = 0; k < corners.length; k++) corners[k] = faces[k >> 2];
+// Returns an attribute with a copy of four bytes, the number of each face, for each of its corners. `slots` are the
+// positions of the faces in it.
+function ofCorners(count, slots, numberOf, isNormalized = false) {
+  const corners = new Uint32Array(4 * count);
+  for (let k = 0; k < count; k++) {
+    const [number, at] = [numberOf(k), 4 * slots[k]];
+    corners[at] = corners[at + 1] = corners[at + 2] = corners[at + 3] = number;
+  }
   return new THREE.BufferAttribute(new Uint8Array(corners.buffer), 4, isNormalized);
+}
+
+// Order of the directions of faces (+x -x +y -y +z -z) in a mesh, so that those on one side of it are adjacent.
+const ORDER = [0, 2, 4, 1, 3, 5];
+
+// Faces of a node by direction. A camera sees at most half of the directions of a node beside it.
+class Sides {
+  constructor({ count, places }) {
+    this.counts = new Array(6).fill(0);
+    // The plane from which on a camera sees some faces of a direction.
+    this.planes = [0, 1, 2, 3, 4, 5].map((side) => (side & 1 ? -Infinity : Infinity));
+    for (let k = 0; k < count; k++) {
+      const side = places[k] >>> 24;
+      const at = places[k] >> 8 * (side >> 1) & 255;
+      this.counts[side]++;
+      if (side & 1) this.planes[side] = Math.max(this.planes[side], at);
+      else this.planes[side] = Math.min(this.planes[side], at + 1);
+    }
+    this.starts = [];
+    let start = 0;
+    for (const side of ORDER) {
+      this.starts[side] = start;
+      start += this.counts[side];
+    }
+  }
+
+  // Returns the position of each face in the mesh.
+  slots({ count, places }) {
+    const next = [...this.starts];
+    return Uint32Array.from({ length: count }, (_, k) => next[places[k] >>> 24]++);
+  }
+
+  // Selects the faces whose direction a camera may see from a place in the node's voxels.
+  select(eye, mesh) {
+    let ranges = 0;
+    let end = -1;
+    for (const side of ORDER) {
+      const [count, start, along] = [this.counts[side], this.starts[side], eye[side >> 1]];
+      const isSeen = side & 1 ? along < this.planes[side] + 1e-3 : along > this.planes[side] - 1e-3;
+      if (count === 0 || !isSeen) continue;
+      if (start === end) {
+        mesh._multiDrawCounts[ranges - 1] += 6 * count;
+      } else {
+        [mesh._multiDrawStarts[ranges], mesh._multiDrawCounts[ranges]] = [24 * start, 6 * count];
+        ranges++;
+      }
+      end = start + count;
+    }
+    mesh._multiDrawCount = ranges;
+  }
+}
+
+// Mesh of which some ranges are drawn in one call: what three.js has of a mesh of several objects.
+class RangesMesh extends THREE.Mesh {
+  isBatchedMesh = true;
+  _multiDrawStarts = new Int32Array(6);
+  _multiDrawCounts = new Int32Array(6);
+  _multiDrawCount = 0;
+  _colorsTexture = null;
 }
 
 // Returns a mesh with one quad per face in one draw call. `legend` is that of the layer whose values the node has.
 export function meshOf(node, material, legend = null) {
-  const faces = facesOf(node, node.values && paintOf(node, legend));
+  const faces = facesOf(node);
+  const { count, voxels, places, levels } = faces;
+  const sides = new Sides(faces);
+  const slots = sides.slots(faces);
   const geometry = new THREE.BufferGeometry();
-  geometry.setIndex(quadsOf(faces.count));
-  geometry.setDrawRange(0, 6 * faces.count);
-  geometry.setAttribute('place', ofCorners(faces.places));
-  geometry.setAttribute('levels', ofCorners(faces.levels));
-  if (faces.paints) geometry.setAttribute('paint', ofCorners(faces.paints, true));
+  geometry.setIndex(quadsOf(count));
+  geometry.setAttribute('place', ofCorners(count, slots, (k) => places[k]));
+  geometry.setAttribute('levels', ofCorners(count, slots, (k) => levels[k]));
+  if (node.values) {
+    const paint = new Uint32Array(paintOf(node, legend).buffer);
+    geometry.setAttribute('paint', ofCorners(count, slots, (k) => paint[voxels[k]], true));
+  }
   const half = node.size / 2;
   geometry.boundingSphere = new THREE.Sphere(new THREE.Vector3(half, half, half), Math.sqrt(3) * half);
   geometry.boundingBox = new THREE.Box3(new THREE.Vector3(), new THREE.Vector3(node.size, node.size, node.size));
-  const mesh = new THREE.Mesh(geometry, material);
+  const mesh = new RangesMesh(geometry, material);
   mesh.position.set(...node.corner);
   mesh.scale.setScalar(node.edge);
   mesh.userData.node = node;
-  mesh.userData.faces = faces.count;
+  mesh.userData.faces = count;
   mesh.raycast = () => {};
   mesh.onBeforeRender = (renderer, scene, camera, geometry_, drawn) => {
+    const [eye, at] = [camera.matrixWorld.elements, mesh.matrixWorld.elements];
+    sides.select([12, 13, 14].map((k) => (eye[k] - at[k]) / node.edge), mesh);
     drawn.uniforms.lastScan.value = node.lastScan === 0xffffffff ? 0 : node.lastScan;
     const { values } = node;
     const isPainted = Boolean(values) && values.name === drawn.uniforms.layer.value;

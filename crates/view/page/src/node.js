@@ -45,37 +45,36 @@ export function parseNode(buffer) {
 const cell = (x, y, z) => x + 1 + MOST * (y + 1 + MOST * (z + 1));
 const BESIDE = [1, -1, MOST, -MOST, MOST * MOST, -MOST * MOST];
 
-// Returns the faces that any threshold can make visible: position and direction (+x -x +y -y +z -z), the value of the
-// voxel, that of its neighbour plus one (0 without a neighbour), and the count; and its colour by a layer, if `paint` has
-// one for each voxel. Only occupied voxels (kind 0) have values to compare. Voxels of a comparison have sets of classes: a
-// face is visible if some class of its voxel is shown, and none of its neighbour.
-export function facesOf(node, paint) {
-  const { count, x, y, z, value, counts, kind } = node;
+// Faces of the current node, before their number is known.
+let faces = { voxels: new Uint32Array(0), places: new Uint32Array(0), levels: new Uint32Array(0) };
+
+// Returns the faces that any threshold can make visible, four bytes in a number for each: position and direction
+// (`places`: x, y, z, +x -x +y -y +z -z), the value of the voxel, that of its neighbour plus one (0 without a neighbour),
+// and the count (`levels`); and the voxel. The arrays are valid until the next call. Only occupied voxels (kind 0) have
+// values to compare. Voxels of a comparison have sets of classes: a face is visible if some class of its voxel is shown,
+// and none of its neighbour.
+export function facesOf({ count, x, y, z, value, counts, kind }) {
   const isCompared = kind === KIND.compared;
+  if (faces.voxels.length < 6 * count) {
+    faces = { voxels: new Uint32Array(6 * count), places: new Uint32Array(6 * count), levels: new Uint32Array(6 * count) };
+  }
+  const { voxels, places, levels } = faces;
   for (let i = 0; i < count; i++) grid[cell(x[i], y[i], z[i])] = kind === KIND.occupied ? value[i] + 1 : isCompared ? value[i] : 256;
-  const isHidden = (own, beside) => (isCompared ? (own & ~beside) === 0 : beside >= own);
   let n = 0;
   for (let i = 0; i < count; i++) {
     const at = cell(x[i], y[i], z[i]);
-    for (const step of BESIDE) if (!isHidden(grid[at], grid[at + step])) n++;
-  }
-  const places = new Uint8Array(4 * n);
-  const levels = new Uint8Array(4 * n);
-  const paints = paint && new Uint8Array(4 * n);
-  n = 0;
-  for (let i = 0; i < count; i++) {
-    const at = cell(x[i], y[i], z[i]);
+    const own = grid[at];
     for (let side = 0; side < 6; side++) {
       const beside = grid[at + BESIDE[side]];
-      if (isHidden(grid[at], beside)) continue;
-      places.set([x[i], y[i], z[i], side], 4 * n);
-      levels.set([value[i], beside, counts[i], 0], 4 * n);
-      paints?.set(paint.subarray(4 * i, 4 * i + 4), 4 * n);
+      if (isCompared ? (own & ~beside) === 0 : beside >= own) continue;
+      voxels[n] = i;
+      places[n] = x[i] | y[i] << 8 | z[i] << 16 | side << 24;
+      levels[n] = value[i] | beside << 8 | counts[i] << 16;
       n++;
     }
   }
   for (let i = 0; i < count; i++) grid[cell(x[i], y[i], z[i])] = 0;
-  return { places, levels, paints, count: n };
+  return { voxels, places, levels, count: n };
 }
 
 // Returns the positions of a node's voxels for ray casting, computed on first use.

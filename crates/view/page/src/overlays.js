@@ -1,9 +1,9 @@
 import * as THREE from 'three';
 
-const line = (points, colour, closed = false) => {
+// Returns a line between each pair of points.
+const lines = (points, colour) => {
   const geometry = new THREE.BufferGeometry().setFromPoints(points.map((p) => new THREE.Vector3(...p)));
-  const material = new THREE.LineBasicMaterial({ color: colour, depthTest: !closed });
-  return closed ? new THREE.LineSegments(geometry, material) : new THREE.Line(geometry, material);
+  return new THREE.LineSegments(geometry, new THREE.LineBasicMaterial({ color: colour, depthTest: false }));
 };
 
 // Layer of three.js with the overlays of the first map; the others belong to all maps.
@@ -42,10 +42,13 @@ export class Overlays {
   }
 
   // Lines are relative to their first point, because `f32` is too coarse for coordinates of millions of metres.
-  path(name, points, colour) {
+  // `starts` are the indices of the first points of further lines.
+  path(name, points, colour, starts = []) {
     if (points.length === 0) return this.set(name, null);
     const base = points[0];
-    const drawn = line(points.map((p) => p.map((k, axis) => k - base[axis])), colour);
+    const begins = new Set([0, ...starts]);
+    const pairs = points.flatMap((point, k) => (begins.has(k) ? [] : [points[k - 1], point]));
+    const drawn = lines(pairs.map((p) => p.map((k, axis) => k - base[axis])), colour);
     drawn.position.set(...base);
     drawn.renderOrder = 2;
     drawn.material.depthTest = !ABOVE_ALL.includes(name);
@@ -84,7 +87,7 @@ export class Overlays {
   box(name, low, high, colour) {
     const size = high.map((k, axis) => k - low[axis]);
     const corner = (k) => [k & 1, k >> 1 & 1, k >> 2].map((on, axis) => on * size[axis]);
-    const drawn = line(EDGES.flatMap(([a, b]) => [corner(a), corner(b)]), colour, true);
+    const drawn = lines(EDGES.flatMap(([a, b]) => [corner(a), corner(b)]), colour);
     drawn.position.set(...low);
     drawn.renderOrder = 3;
     this.set(name, drawn);

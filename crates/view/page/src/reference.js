@@ -43,6 +43,17 @@ function extremes(heights, width, reach, of) {
   return found;
 }
 
+// Returns the horizontal length of the step to each position.
+const lengthsOf = (path) => path.map((at, k) => (k ? Math.hypot(at[0] - path[k - 1][0], at[1] - path[k - 1][1]) : 0));
+
+// Returns the positions after jumps. Usual steps are at least so many metres.
+export function startsOf(path, least) {
+  const lengths = lengthsOf(path);
+  const sorted = Float64Array.from(lengths.slice(1)).sort();
+  const longest = JUMP_STEPS * Math.max(sorted[Math.floor(sorted.length / 2)] ?? 0, least);
+  return lengths.flatMap((length, k) => (length > longest ? [k] : []));
+}
+
 // Heights on a grid of square cells around a box, in map coordinates: of the trajectory, or of the ground.
 export class Reference {
   // `bounds` are those of the maps, `path` positions of the sensor, `resolution` the edge of the finest voxels.
@@ -55,13 +66,12 @@ export class Reference {
     // Heights that are known, and the voxels' edge that they are known to.
     this.known = new Float64Array(this.width * this.height).fill(NaN);
     this.edges = new Float64Array(this.width * this.height).fill(Infinity);
-    const lengths = path.map((at, k) => (k ? Math.hypot(at[0] - path[k - 1][0], at[1] - path[k - 1][1]) : 0));
-    const sorted = Float64Array.from(lengths.slice(1)).sort();
-    const longest = JUMP_STEPS * Math.max(sorted[Math.floor(sorted.length / 2)] ?? 0, 2 * this.cell);
+    const lengths = lengthsOf(path);
+    const starts = new Set(startsOf(path, 2 * this.cell));
     path.forEach((at, k) => {
       // Cells between positions, too, except across jumps.
       const before = path[Math.max(k - 1, 0)];
-      const steps = lengths[k] > longest ? 1 : Math.min(Math.ceil(lengths[k] / this.cell) + 1, 2 * (this.width + this.height));
+      const steps = starts.has(k) ? 1 : Math.min(Math.ceil(lengths[k] / this.cell) + 1, 2 * (this.width + this.height));
       for (let step = 1; step <= steps; step++) {
         const cell = this.cellOf(at.map((value, axis) => before[axis] + (value - before[axis]) * step / steps));
         if (cell !== null) this.known[cell] = before[2] + (at[2] - before[2]) * step / steps;

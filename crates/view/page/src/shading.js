@@ -42,23 +42,30 @@ void main() {
   gl_FragColor = vec4(colour * exp(-strength * sum), 1.0);
 }`;
 
+function targetOf(samples) {
+  const target = new THREE.WebGLRenderTarget(1, 1, { samples, depthTexture: new THREE.DepthTexture(1, 1, THREE.FloatType) });
+  // Colours are written in sRGB, as on the screen.
+  target.isXRRenderTarget = true;
+  target.texture.colorSpace = THREE.SRGBColorSpace;
+  target.texture.internalFormat = 'RGBA8';
+  return target;
+}
+
 // Draws a scene with shades.
 export class Shading {
   constructor(renderer) {
     this.renderer = renderer;
-    this.target = new THREE.WebGLRenderTarget(1, 1, { samples: 4, depthTexture: new THREE.DepthTexture(1, 1, THREE.FloatType) });
-    // Colours are written in sRGB, as on the screen.
-    this.target.isXRRenderTarget = true;
-    this.target.texture.colorSpace = THREE.SRGBColorSpace;
-    this.target.texture.internalFormat = 'RGBA8';
+    // Whether edges are smooth.
+    this.isSmooth = true;
+    this.targets = new Map([4, 0].map((samples) => [samples, targetOf(samples)]));
     this.material = new THREE.ShaderMaterial({
       vertexShader: vertex,
       fragmentShader: fragment,
       depthTest: false,
       depthWrite: false,
       uniforms: {
-        colours: { value: this.target.texture },
-        depths: { value: this.target.depthTexture },
+        colours: { value: null },
+        depths: { value: null },
         inverse: { value: new THREE.Vector2() },
         sky: { value: new THREE.Vector3() },
         radius: { value: 1 },
@@ -81,8 +88,11 @@ export class Shading {
 
   // Draws the columns of pixels from `from` to `to`.
   draw(scene, camera, from = 0, to = Infinity) {
-    const { renderer, target, material } = this;
+    const { renderer, material } = this;
     const { width, height } = renderer.domElement;
+    const target = this.targets.get(this.isSmooth ? 4 : 0);
+    material.uniforms.colours.value = target.texture;
+    material.uniforms.depths.value = target.depthTexture;
     if (target.width !== width || target.height !== height) target.setSize(width, height);
     const radius = Math.max(Math.round(RADIUS * renderer.getPixelRatio()), 1);
     material.uniforms.radius.value = radius;

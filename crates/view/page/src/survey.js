@@ -5,15 +5,6 @@ import { parseNode } from './node.js';
 
 // Number of voxels of the first view, sampled evenly.
 const MOST_POINTS = 4000;
-// Share of the sensor's places below a ceiling of a map that is an interior.
-const ROOFED = 0.6;
-// Share of the voxels that must remain below the cut.
-const KEPT = 0.3;
-// Maximum height of a ceiling above the sensor, in metres.
-const CEILING_M = 20;
-// Maximum spread of the sensor's heights on one storey, in metres.
-const MOST_SPREAD_M = 2;
-
 const share = (sorted, at) => sorted[Math.min(Math.floor(at * sorted.length), sorted.length - 1)];
 
 // Returns the 2nd and the 98th percentile; `null` of no values.
@@ -56,36 +47,6 @@ export async function survey({ root }, base) {
   const points = inside.filter((_, k) => k % step === 0).map((k) => along.map((values) => values[k]));
   const [low, high] = percentiles(along[2]);
   return { edge, along, core: { min, max }, points, heights: [low - edge / 2, high + edge / 2], counts: percentiles(counts) };
-}
-
-// Returns the height at which to cut the ceiling of an interior: between the sensor and the ceiling above most of its
-// places. `null` if most places have none.
-export function ceilingOf({ edge, along }, path) {
-  if (path.length === 0) return null;
-  const columns = new Map();
-  const key = (x, y) => `${Math.floor(x / edge)} ${Math.floor(y / edge)}`;
-  along[2].forEach((z, k) => {
-    const at = key(along[0][k], along[1][k]);
-    if (!columns.has(at)) columns.set(at, []);
-    columns.get(at).push(z - edge / 2);
-  });
-  const step = Math.max(Math.floor(path.length / 500), 1);
-  const places = path.filter((_, k) => k % step === 0);
-  const sensors = places.map((place) => place[2]);
-  // Above several storeys, one cut would leave out the rooms of some.
-  const [lowest, highest] = path.reduce(([low, high], [, , z]) => [Math.min(low, z), Math.max(high, z)], [Infinity, -Infinity]);
-  if (highest - lowest > MOST_SPREAD_M) return null;
-  const ceilings = places.flatMap(([x, y, z]) => {
-    const above = columns.get(key(x, y)) ?? [];
-    // A place without a floor is not in a room: perhaps z is not up.
-    if (!above.some((bottom) => bottom < z)) return [];
-    const nearest = Math.min(...above.filter((bottom) => bottom > z + Math.max(edge, 0.3) && bottom < z + CEILING_M));
-    return Number.isFinite(nearest) ? [nearest] : [];
-  });
-  if (ceilings.length < ROOFED * places.length) return null;
-  const ceiling = share(Float64Array.from(ceilings).sort(), 0.1);
-  const cut = 0.5 * (Math.max(...sensors) + ceiling);
-  return along[2].filter((z) => z < cut).length < KEPT * along[2].length ? null : cut;
 }
 
 // Returns the horizontal direction of greatest extent, as a unit vector with x >= 0.

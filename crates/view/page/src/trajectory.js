@@ -4,6 +4,7 @@ import { app, viewer } from './app.js';
 import { $, json, say, tell } from './dom.js';
 import { timeText } from './layers.js';
 import { idOf } from './maps.js';
+import { startsOf } from './reference.js';
 
 let pathNumber = 0;
 // Time stamps of the positions in seconds, if they are known.
@@ -13,9 +14,9 @@ let playTimer = 0;
 
 export async function readPath() {
   const number = ++pathNumber;
-  let [points, stamps, areDates] = [[], null, false];
+  let [points, stamps, areDates, parts] = [[], null, false, []];
   try {
-    ({ points, times_s: stamps = null, is_unix_time: areDates = false } = await json(`maps/${idOf(app.maps[0]).split('~')[0]}/trajectory.json`));
+    ({ points, times_s: stamps = null, is_unix_time: areDates = false, parts = [] } = await json(`maps/${idOf(app.maps[0]).split('~')[0]}/trajectory.json`));
   } catch (error) {
     say(`Cannot load the trajectory: ${error.message}`);
   }
@@ -28,7 +29,7 @@ export async function readPath() {
   $('scan').max = Math.max(app.path.length - 1, 0);
   $('scan').value = $('scan').max;
   $('scan').disabled = app.path.length < 2;
-  viewer.overlays.path('path', app.path, 0xff3b6b);
+  viewer.overlays.path('path', app.path, 0xff3b6b, [...parts, ...startsOf(app.path, 2 * app.maps[0].resolution_m)]);
   showScan();
 }
 

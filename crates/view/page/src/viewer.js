@@ -6,11 +6,16 @@ import { LAYERS } from './palette.js';
 import { sharedUniforms } from './material.js';
 import { KIND } from './node.js';
 import { OF_FIRST_MAP, Overlays } from './overlays.js';
+import { Pace, Timers } from './pace.js';
 import { Shading } from './shading.js';
 
 const MOST_CALLS = 200;
-// Slower frames count as this long.
-const MOST_FRAME_MS = 400;
+// Maximum pause between frames while nodes are loaded.
+const MOST_PAUSE_MS = 2000;
+// Interval of updates of the nodes to load.
+const LOAD_MS = 16;
+// Time without a change after which edges are smoothed, where drawing is slow.
+const SMOOTH_AFTER_MS = 400;
 // Draw calls reserved for overlays: trajectory, sensor, moving points, distances, marks, change, ground, grid, bounding box, section, cut box;
 // and for the shading.
 const OVERLAY_CALLS = 16;
@@ -55,8 +60,8 @@ export class Viewer {
     this.moves = [];
     this.firstPictureMs = null;
     this.frames = 0;
-    this.frameMs = 0;
-    this.timer = 0;
+    this.pace = new Pace(this.renderer.getContext());
+    this.timers = new Timers();
     this.mostCalls = 0;
     this.last = performance.now();
     new ResizeObserver(() => this.resize()).observe(canvas);
@@ -128,52 +133,71 @@ export class Viewer {
       this.settled = false;
       for (const listener of this.listeners) listener(this);
     }
-    clearTimeout(this.timer);
-    this.timer = 0;
+    for (const name of ['frame', 'smooth']) this.timers.clear(name);
+    // A frame may have to wait for the drawing of the last one; loading does not.
+    this.loadSoon();
     if (this.waits) return;
     this.waits = true;
-    const since = performance.now();
     requestAnimationFrame((now) => {
       this.waits = false;
       this.frame(now);
-      // Time of a frame with its wait for the drawing before it.
-      this.frameMs = Math.min(performance.now() - since, MOST_FRAME_MS);
     });
   }
 
-  // Requests a frame for nodes that were loaded. Where frames are slow, loading gets most of the time.
+  // Requests a frame for nodes that were loaded. Where drawing is slow, loading gets most of the time.
   wakeSoon() {
-    if (this.waits || this.timer) return;
+    if (this.waits) return;
     this.settled = false;
     const isLoading = this.layers.some(({ tiles }) => !Layer.isIdle(tiles));
-    this.timer = setTimeout(() => this.wake(), isLoading ? Math.max(30, 2 * this.frameMs) : 30);
+    const pause = isLoading ? Math.min(5 * this.pace.drawMs, MOST_PAUSE_MS) : 0;
+    this.timers.set('frame', () => this.wake(), Math.max(60, pause));
+  }
+
+  // Loads nodes between frames.
+  loadSoon() {
+    this.timers.set('load', () => this.load(), LOAD_MS);
+  }
+
+  load(isFrame = false) {
+    this.timers.clear('load');
+    this.fitDepth();
+    for (const layer of this.layers) layer.update();
+    // Equal levels on both sides of a swipe: other levels would look like changes.
+    if (this.isSplit) this.layers[0].adapt(this.layers.slice(1), isFrame);
+    else for (const layer of this.layers) layer.adapt([], isFrame);
+    this.isReady = this.layers.every((layer) => layer.isReady);
+    if (isFrame || this.settled || this.waits) return;
+    if (this.isReady) this.wake();
+    else if (this.layers.every(({ tiles }) => Layer.isIdle(tiles))) this.loadSoon();
   }
 
   frame(now) {
     const seconds = (now - this.last) / 1000;
     this.last = now;
     const moved = this.flight.update(seconds);
-    this.fitDepth();
-    for (const layer of this.layers) layer.update();
-    // Equal levels on both sides of a swipe: other levels would look like changes.
-    if (this.isSplit) this.layers[0].adapt(this.layers.slice(1));
-    else for (const layer of this.layers) layer.adapt([]);
+    this.load(true);
     this.paint();
     for (const layer of this.layers) layer.tiles.group.visible = layer.isShown && this.shows.occupied;
     for (const layer of this.layers) layer.near.visible = layer.isShown;
     this.leaveOutFarthest();
     for (const follow of this.moves) follow();
-    this.draw();
+    this.draw(!this.pace.isSlow);
     this.frames++;
     this.mostCalls = Math.max(this.mostCalls, this.renderer.info.render.calls);
     const meshes = this.layers.reduce((sum, layer) => sum + layer.tiles.visibleTiles.size, 0);
     if (this.firstPictureMs === null && meshes > 0) this.firstPictureMs = performance.now();
-    // The view is settled after two frames in which no node is pending and the camera does not move.
-    const isReady = this.layers.every((layer) => layer.isReady);
-    this.settled = isReady && this.wasReady && !moved;
-    this.wasReady = isReady;
+    // The view is settled after a frame in which no node is pending and the camera does not move.
+    this.settled = this.isReady && !moved;
     for (const listener of this.listeners) listener(this);
-    if (!this.settled) this[moved ? 'wake' : 'wakeSoon']();
+    if (this.settled) this.timers.set('smooth', () => this.smooth(), SMOOTH_AFTER_MS);
+    else if (moved) this.wake();
+    else this.wakeSoon();
+    if (!this.isReady) this.loadSoon();
+  }
+
+  // Draws a settled view again with smooth edges, if frames have none because drawing is slow.
+  smooth() {
+    if (this.settled && this.pace.mayBeSmooth) this.draw();
   }
 
   // First column of pixels of the later state.
@@ -181,13 +205,19 @@ export class Viewer {
     return Math.round(this.share * this.canvas.width);
   }
 
-  draw() {
-    const { renderer, shading, scene, camera, layers } = this;
+  // Draws a frame; `isSmooth`: with smooth edges, which take most of the time of software.
+  draw(isSmooth = true) {
+    const { renderer, shading, scene, camera } = this;
     renderer.info.reset();
-    if (!this.isSplit) {
-      shading.draw(scene, camera);
-      return;
-    }
+    shading.isSmooth = isSmooth;
+    this.pace.begin(isSmooth);
+    if (this.isSplit) this.drawSides();
+    else shading.draw(scene, camera);
+    this.pace.end();
+  }
+
+  drawSides() {
+    const { shading, scene, camera, layers } = this;
     const { border, canvas } = this;
     for (const [side, from, to] of [[0, 0, border], [1, border, canvas.width]]) {
       if (from === to) continue;

@@ -9,13 +9,20 @@ import { obliqueOf } from './survey.js';
 const views = [];
 let leftAt = 0;
 const MOST_VIEWS = 50;
+// Camera of the first view.
+let startedAt = '';
+const pose = () => JSON.stringify([viewer.camera.position, viewer.flight.orbit.target]);
 
 export function start() {
   viewer.center(allBounds());
   surround();
   if (app.link.eye && app.link.to) viewer.flight.lookAt(viewer.toScene(app.link.eye), viewer.toScene(app.link.to));
   else viewer.frameMost(oblique());
+  startedAt = pose();
 }
+
+// Returns whether the camera was not moved since the start.
+export const isAtStart = () => pose() === startedAt;
 
 const oblique = () => obliqueOf(mostOf()[1], app.path);
 

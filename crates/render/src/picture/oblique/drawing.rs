@@ -69,6 +69,13 @@ pub fn draw(
     let Some(bounds) = extent.bounds(outside) else {
         return Ok(nothing(picture, &map.config().grid, tiles.len() as u64, collector.into_unread()));
     };
+    // The trajectory is inside, too, but not where it leaves the map or the region.
+    let grid = map.config().grid;
+    let places = picture.path.iter().filter_map(|place| grid.voxel_of(*place));
+    let bounds = places.filter(|&voxel| voxels.contains(voxel)).fold(bounds, |bounds, voxel| {
+        let [right, up, _] = camera.project(Camera::middle(voxels.min, voxel));
+        bounds.with([right, up])
+    });
     let plan = Plan::of(picture, camera, voxels.min, &bounds, extent.depth());
     let samples = Samples::new(plan.frame);
     collector.for_each_tile(&tiles, &progress, |index| {

@@ -83,6 +83,16 @@ pub struct Bounds {
     pub map: [[f64; 2]; 3],
 }
 
+impl Bounds {
+    /// Returns the bounds with a position, in voxels to the right and up in the image.
+    pub fn with(mut self, at: [f64; 2]) -> Self {
+        for (bounds, at) in self.image.iter_mut().zip(at) {
+            *bounds = [bounds[0].min(at), bounds[1].max(at)];
+        }
+        self
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -103,5 +113,7 @@ mod tests {
         assert!(is_near(all.image[0], [100.0, 901.0]) && is_near(all.map[2], [5.0, 41.0]), "{all:?}");
         let most = extent.bounds(0.002).unwrap();
         assert!(is_near(most.image[0], [100.0, 200.0]) && is_near(most.map[1], [0.0, 10.0]), "{most:?}");
+        let wider = most.with([150.0, 999.0]);
+        assert_eq!(wider.image, [most.image[0], [most.image[1][0], 999.0]]);
     }
 }

@@ -6,8 +6,9 @@ use super::plan::Plan;
 use super::samples::Samples;
 use voxtile::space::Point;
 
-/// Radius of the line in points.
-const RADIUS_PT: f64 = 0.9;
+/// Radius of the line in metres, and its minimum and maximum in points: a wide line hides streets of large maps.
+const RADIUS_M: f64 = 0.2;
+const RADIUS_PT: [f64; 2] = [0.4, 0.9];
 /// Visible parts shorter than this many radii are holes in a surface.
 const MIN_VISIBLE: usize = 8;
 /// Opacity of hidden parts.
@@ -73,7 +74,8 @@ impl Trajectory<'_> {
                 }
             }
         }
-        let radius = measure.px(RADIUS_PT);
+        let [least, most] = RADIUS_PT.map(|radius_pt| measure.px(radius_pt));
+        let radius = ((RADIUS_M / resolution_m * plan.zoom()) as usize).clamp(least, most);
         let (mut visible, mut hidden) = (Vec::new(), Vec::new());
         let is_one = runs.len() == 1;
         for (is_visible, run) in &mut runs {
