@@ -19,6 +19,8 @@ pub struct Roof {
     pub sensor_m: f64,
     /// Difference between its highest and lowest position, in metres.
     pub spread_m: f64,
+    /// Height in metres below which a tenth of the roofs begin; infinite without a roof.
+    pub ceiling_m: f64,
 }
 
 /// Maximum number of columns of tiles that are read, evenly along the trajectory.
@@ -31,6 +33,8 @@ const COLUMN_M: f64 = 0.5;
 const ROOM_SHARE: f64 = 0.55;
 /// Share of roofed columns with a floor from which on z is up. Cameras have other axes: a cut would leave nothing.
 const FLOOR_SHARE: f64 = 0.2;
+/// What hangs lower above the sensor is furniture, not a ceiling.
+const MIN_CEILING_M: f64 = 0.3;
 /// Heights of a sensor that stays on one floor differ by less. One cut would hide the upper storeys of others.
 const MAX_SPREAD_M: f64 = 2.0;
 
@@ -63,10 +67,19 @@ impl Roof {
         }
         let counts = stacks
             .par_iter()
-            .map(|(at, height_m)| count(map, tiles.get(at).map_or(&[], Vec::as_slice), *height_m));
-        let sum = |a: [u64; 3], b: [u64; 3]| Ok([0, 1, 2].map(|k| a[k] + b[k]));
-        let [columns, roofed, floored] = counts.try_reduce(|| [0; 3], sum)?;
-        Ok(Some(Self { columns, roofed, floored, sensor_m, spread_m }))
+            .map(|(at, height_m)| columns_of(map, tiles.get(at).map_or(&[], Vec::as_slice), *height_m));
+        let columns: Vec<Column> = counts.collect::<Result<Vec<_>>>()?.concat();
+        let number = |is_counted: fn(&&Column) -> bool| columns.iter().filter(is_counted).count() as u64;
+        let mut ceilings_m: Vec<f64> = columns.iter().filter_map(|column| column.ceiling_m).collect();
+        ceilings_m.sort_unstable_by(f64::total_cmp);
+        Ok(Some(Self {
+            columns: number(|column| column.is_free),
+            roofed: number(|column| column.is_free && column.has_roof),
+            floored: number(|column| column.is_free && column.has_roof && column.has_floor),
+            sensor_m,
+            spread_m,
+            ceiling_m: ceilings_m.get(ceilings_m.len() / 10).copied().unwrap_or(f64::INFINITY),
+        }))
     }
 
     /// Share of roofed columns, 0 to 1.
@@ -83,19 +96,37 @@ impl Roof {
         let has_floor = self.floored as f64 >= FLOOR_SHARE * self.roofed as f64;
         (is_roofed && has_floor && self.spread_m <= MAX_SPREAD_M).then_some(self.sensor_m)
     }
+
+    /// Like [`Roof::cut_m`], for oblique views: walls are cut halfway between the sensor, which may be near the floor,
+    /// and the ceiling.
+    pub fn oblique_cut_m(&self) -> Option<f64> {
+        let halfway_m = f64::midpoint(self.sensor_m, self.ceiling_m);
+        self.cut_m().map(|cut_m| if halfway_m.is_finite() { halfway_m.max(cut_m) } else { cut_m })
+    }
 }
 
-/// Returns the columns of a stack of tiles that are free at a height, those of them with an occupied voxel above, and
-/// those of these with another one below.
-fn count(map: &dyn MapView, tiles: &[TileIndex], height_m: f64) -> Result<[u64; 3]> {
+/// Column of half a metre in a stack of tiles.
+#[derive(Clone, Copy, Debug, Default)]
+struct Column {
+    /// Whether it has free space at the height of the sensor.
+    is_free: bool,
+    /// Whether it has an occupied voxel above the sensor.
+    has_roof: bool,
+    /// Whether it has an occupied voxel below the sensor.
+    has_floor: bool,
+    /// Lower side of the lowest occupied voxel well above the sensor.
+    ceiling_m: Option<f64>,
+}
+
+/// Returns the columns of a stack of tiles with a sensor at a height.
+fn columns_of(map: &dyn MapView, tiles: &[TileIndex], height_m: f64) -> Result<Vec<Column>> {
     let (grid, occupied_from) = (map.config().grid, map.config().occupied_log_odds());
-    let Some([_, _, sensor]) = grid.voxel_of([0.0, 0.0, height_m]) else { return Ok([0; 3]) };
+    let Some([_, _, sensor]) = grid.voxel_of([0.0, 0.0, height_m]) else { return Ok(Vec::new()) };
     let away = (MAX_AWAY_M / grid.resolution_m()).min(1e9) as i32;
     let [lowest, highest] = [sensor.saturating_sub(away), sensor.saturating_add(away)];
     let wide = ((COLUMN_M / grid.resolution_m()).round().min(1e9) as i32).max(1);
     let edge = grid.voxels_per_tile_edge().div_euclid(wide) + 1;
-    // By column: bit 1 is free at the height of the sensor, bit 2 is occupied above, bit 4 is occupied below.
-    let mut columns = vec![0_u8; (edge * edge) as usize];
+    let mut columns = vec![Column::default(); (edge * edge) as usize];
     for &index in tiles {
         let voxels = grid.voxels_of_tile(index);
         if voxels.end[2] <= lowest || voxels.min[2] > highest {
@@ -115,7 +146,7 @@ fn count(map: &dyn MapView, tiles: &[TileIndex], height_m: f64) -> Result<[u64; 
                 for y in voxels.min[1]..voxels.end[1] {
                     let evidence = tile.evidence([x, y, sensor]);
                     if evidence.is_some_and(|evidence| evidence.log_odds < occupied_from) {
-                        columns[place([x, y, sensor])] |= 1;
+                        columns[place([x, y, sensor])].is_free = true;
                     }
                 }
             }
@@ -126,11 +157,17 @@ fn count(map: &dyn MapView, tiles: &[TileIndex], height_m: f64) -> Result<[u64; 
                 && z != sensor
                 && let Some(column) = columns.get_mut(place(voxel.index))
             {
-                *column |= if z > sensor { 2 } else { 4 };
+                column.has_floor |= z < sensor;
+                column.has_roof |= z > sensor;
+                let bottom_m = f64::from(z) * grid.resolution_m();
+                if bottom_m > height_m + MIN_CEILING_M {
+                    let lowest = column.ceiling_m.unwrap_or(f64::INFINITY);
+                    column.ceiling_m = Some(lowest.min(bottom_m));
+                }
             }
         }
     }
-    Ok([1, 3, 7].map(|bits| columns.iter().filter(|&&column| column & bits == bits).count() as u64))
+    Ok(columns)
 }
 
 fn median(mut heights: Vec<f64>) -> Option<f64> {

@@ -70,6 +70,9 @@ fn columns_are_those_of_a_naive_count() {
         assert_eq!((roof.columns, roof.roofed, roof.sensor_m), (free.len() as u64, both, 1.1), "{share}");
         assert_eq!(roof.floored, rooms, "{share}");
         assert_eq!(roof.cut_m(), (roof.share() >= 0.55).then_some(1.1));
+        assert_eq!(roof.ceiling_m, if share > 0.0 { 3.0 } else { f64::INFINITY }, "{share}");
+        let between = f64::midpoint(1.1, 3.0);
+        assert_eq!(roof.oblique_cut_m(), roof.cut_m().map(|_| between), "{share}");
     }
 }
 

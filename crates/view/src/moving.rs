@@ -94,7 +94,7 @@ impl Marks {
         Self { keeps_scans: false, points: 0, points_to_read: 0, version: 0 }
     }
 
-    /// Of how many scans with marks one is read, to read some `max_points` points.
+    /// Returns *n* such that every *n*th scan with marks has about `max_points` points in all.
     fn every(&self, max_points: u64) -> u64 {
         self.points_to_read.div_ceil(max_points).max(1)
     }

@@ -13,6 +13,6 @@ pub fn overview(map: &AnyMap, tiles: &[TileIndex], within: Option<&Aabb>) -> Res
     };
     let path: Vec<Point> =
         path.into_iter().filter(|at| within.is_none_or(|within| within.contains(*at))).collect();
-    let ceiling_m = Roof::of(map, &path)?.and_then(|roof| roof.cut_m());
+    let ceiling_m = Roof::of(map, &path)?.and_then(|roof| roof.oblique_cut_m());
     Ok(json!({ "ceiling_m": ceiling_m, "heights_m": height_range_m(map, tiles)? }))
 }

@@ -35,7 +35,8 @@ pub(crate) const ALL_CELLS: usize = SIDES * CELLS_PER_SIDE;
 /// In place of a cell: a ray too short to have a direction.
 pub(crate) const NO_DIRECTION: u32 = ALL_CELLS as u32;
 
-/// Returns the number of the cell through which a ray passes, over all sides, or [`NO_DIRECTION`]. Without branches, so that a loop over many rays becomes vector instructions.
+/// Returns the number of the cell through which a ray passes, over all sides, or [`NO_DIRECTION`]. Without branches, so
+/// that a loop over many rays becomes vector instructions.
 #[inline]
 pub(crate) fn cell_of(slope: &Slope) -> u32 {
     // Position on the side, from 0 to `CELLS`, apart from rounding.

@@ -23,6 +23,12 @@ pub(crate) struct Window {
 }
 
 impl Window {
+    /// Returns whether a window of at most `max_pages` holds all points with these bounds, in units of voxels.
+    pub(crate) fn can_hold((low, high): (Point, Point), max_pages: usize) -> bool {
+        let pages: f64 = (0..3).map(|k| (high[k] - low[k]) / PAGE_EDGE as f64 + 2.0).product();
+        pages <= (max_pages as f64).min(MAX_PAGES as f64)
+    }
+
     /// Returns the window around `center` for points with these bounds, both in units of voxels.
     pub(crate) fn around(center: VoxelIndex, bounds: (Point, Point)) -> Self {
         let windows = REACHES.map(|reach| Self::reaching(reach, center, bounds));

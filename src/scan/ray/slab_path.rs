@@ -218,7 +218,7 @@ impl Stretch {
         let c_of = |at: u64| (at as u32) >> (32 - BITS);
         let cell = |at: u64| part_of_place(B, b_of(at)) | part_of_place(C, c_of(at));
         let mut mark = |place: u32, bits: u64| words[place as usize / 64 % WORDS] |= bits << (place % 64);
-        // Slabs after the current one. A range would take more instructions a slab.
+        // Slabs after the current one. A `for` loop over a range would take more instructions for each slab.
         let Some(mut left) = self.slabs.checked_sub(1) else { return 0 };
         let pairs = &PAIRS[usize::from(self.is_up)][A];
         let step = if self.is_up { 1 } else { u32::MAX };

@@ -90,10 +90,12 @@ impl<'a> ScanRays<'a> {
             max_threads,
             stop,
         };
+        // A window for all rays in range saves a pass over the points. Clearing it must not take longer.
+        let max_pages = points.len() / scan_rays.threads();
         let in_range = scan_rays.bounds_of_range();
-        let bounds = match in_range.filter(|bounds| Window::around(voxel, *bounds).count() <= points.len()) {
-            Some(bounds) => bounds,
-            None => scan_rays.bounds()?,
+        let bounds = match in_range.filter(|bounds| Window::can_hold(*bounds, max_pages)) {
+            Some(bounds) if is_in_reach(voxel, bounds) => bounds,
+            _ => scan_rays.bounds()?,
         };
         scan_rays.window = Window::around(voxel, bounds);
         scan_rays.all_in_reach = is_in_reach(voxel, bounds);
