@@ -21,7 +21,23 @@ pub struct MapState {
     /// Number of tiles that are not in the coarse levels of detail yet.
     pub pending_tiles: u64,
     /// `overview.json`, once it was requested.
-    pub overview: OnceLock<serde_json::Value>,
+    pub overview: OnceLock<Overview>,
+}
+
+/// Answer of `overview.json`.
+#[derive(Clone)]
+pub struct Overview {
+    value: serde_json::Value,
+    /// Number of tiles of the map when it was computed.
+    tiles: usize,
+}
+
+impl Overview {
+    /// Returns whether it is good enough for a later state with this many tiles: a build that flushes often must not
+    /// read tiles for each flush.
+    fn suits(&self, tiles: usize) -> bool {
+        tiles.abs_diff(self.tiles) * 4 <= self.tiles
+    }
 }
 
 /// One state, or the changes between two.
@@ -46,14 +62,16 @@ impl QueryMap {
 
     /// Returns `overview.json`.
     pub fn overview(&self) -> Result<serde_json::Value> {
-        let map = self.map();
-        let computed = || overview(map, &map.tile_indices(), None);
-        let Self::State(state) = self else { return computed() };
+        let computed = || {
+            let tiles = self.map().tile_indices();
+            Ok(Overview { value: overview(self.map(), &tiles, None)?, tiles: tiles.len() })
+        };
+        let Self::State(state) = self else { return computed().map(|computed| computed.value) };
         if let Some(known) = state.overview.get() {
-            return Ok(known.clone());
+            return Ok(known.value.clone());
         }
-        let value = computed()?;
-        Ok(state.overview.get_or_init(|| value).clone())
+        let computed = computed()?;
+        Ok(state.overview.get_or_init(|| computed).value.clone())
     }
 }
 
@@ -116,6 +134,12 @@ fn difference<'a>(before: &'a MapState, after: &'a MapState) -> Result<Differenc
 }
 
 impl MapState {
+    /// Returns the overview of a later state with this many tiles, if the one of this state suits it.
+    pub fn overview_for(&self, tiles: usize) -> OnceLock<Overview> {
+        let known = self.overview.get().filter(|known| known.suits(tiles));
+        known.map_or_else(OnceLock::new, |known| OnceLock::from(known.clone()))
+    }
+
     /// Returns `layers.json`.
     pub fn layer_legends(&self) -> Result<serde_json::Value> {
         layer_legends(&self.levels, &self.map, &self.store)
@@ -150,4 +174,17 @@ pub fn layer_legends(levels: &Levels, map: &AnyMap, store: &NodeStore) -> Result
         legends.insert("time".into(), json!({ "range_s": range_s, "is_unix_time": is_unix }));
     }
     Ok(legends.into())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_overview_is_renewed_when_the_map_has_grown_by_a_quarter() {
+        let of = |tiles| Overview { value: serde_json::Value::Null, tiles };
+        assert_eq!([99, 100, 125, 126].map(|tiles| of(100).suits(tiles)), [true, true, true, false]);
+        assert!(!of(100).suits(74));
+        assert!(of(0).suits(0) && !of(0).suits(1));
+    }
 }

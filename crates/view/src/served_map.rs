@@ -309,14 +309,15 @@ impl ServedMap {
         for reason in levels.unreadable() {
             log::warn!("tile not shown: {reason}");
         }
-        let generation = self.now().generation + 1;
+        let before = self.now();
+        let overview = before.overview_for(map.tile_indices().len());
         let state = MapState {
             map,
             levels,
             store: self.store.clone(),
-            generation,
+            generation: before.generation + 1,
             pending_tiles,
-            overview: OnceLock::new(),
+            overview,
         };
         *self.now.write() = Arc::new(state);
         changes.send_modify(|count| *count += 1);
