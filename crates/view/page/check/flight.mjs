@@ -6,7 +6,7 @@
 // a flight leaves a place. Prints the heap of JavaScript after a collection, and the buffers of WebGL, ten times. Then
 // waits for SHARP views at the height of a street, each until no node is missing and the frame is drawn. Prints the
 // maximum memory of the server. PAGE is the URL of a page that is served already, instead of VOXTILE, and SERVER its
-// process.
+// process, if its memory is wanted.
 
 import { spawn } from 'node:child_process';
 import { readFileSync } from 'node:fs';
@@ -93,8 +93,11 @@ try {
   times.sort((a, b) => a - b);
   const share = (at) => +times[Math.min(Math.floor(at * times.length), times.length - 1)].toFixed(2);
   if (times.length) console.log(JSON.stringify({ sharp: { jumps: times.length, median_s: share(0.5), p90_s: share(0.9), most_s: share(1) } }));
-  const [, peak] = /VmHWM:\s*(\d+) kB/.exec(readFileSync(`/proc/${server?.pid ?? process.env.SERVER}/status`, 'utf8'));
-  console.log(JSON.stringify({ server_peak_mib: +(peak / 1024).toFixed(1) }));
+  const pid = server?.pid ?? process.env.SERVER;
+  if (pid) {
+    const [, peak] = /VmHWM:\s*(\d+) kB/.exec(readFileSync(`/proc/${pid}/status`, 'utf8'));
+    console.log(JSON.stringify({ server_peak_mib: +(peak / 1024).toFixed(1) }));
+  }
 } finally {
   await browser.close();
   server?.kill();

@@ -1,6 +1,6 @@
 // Measures how fast the server builds and sends nodes:
 //
-//   VOXTILE=PROGRAM node crates/view/page/check/speed.mjs MAP [MOST_NODES]
+//   VOXTILE=PROGRAM node crates/view/page/check/speed.mjs MAP [MAX_NODES]
 //
 // Starts with an empty cache: builds the coarse levels, then requests every node twice, eight at a time.
 // The second time, nodes are read from the cache.

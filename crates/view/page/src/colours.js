@@ -19,7 +19,7 @@ const chosen = new Map();
 let reference = null;
 // Numbers of voxels whose heights above the ground give the range of the colours.
 const PLACES_OF_NODE = 100;
-const MOST_PLACES = 20000;
+const MAX_PLACES = 20000;
 // Names of legends.
 const LEGENDS = {
   height: 'Height', above: 'Height above the trajectory', probability: 'Probability of being occupied', count: 'Observations',
@@ -103,7 +103,7 @@ function aboveOf() {
       if (!grid.isOfTrajectory) grid.add(node);
       added.add(node);
       const step = Math.ceil(node.count / PLACES_OF_NODE);
-      for (let k = 0; k < node.count && places.length < MOST_PLACES; k += step) places.push(centerOf({ node, at: [node.x[k], node.y[k], node.z[k]] }));
+      for (let k = 0; k < node.count && places.length < MAX_PLACES; k += step) places.push(centerOf({ node, at: [node.x[k], node.y[k], node.z[k]] }));
     }
     grid.fill();
     const surveys = app.maps.map((map) => map.survey).filter(Boolean);

@@ -6,7 +6,7 @@ import { sidesOf } from './swipe.js';
 
 const $ = (id) => document.getElementById(id);
 // Maximum number of changes in the list; the buttons reach all that the server sends.
-const MOST_LISTED = 200;
+const MAX_LISTED = 200;
 const CHANGES = 'changes';
 
 export class Comparison {
@@ -79,7 +79,7 @@ export class Comparison {
     }
     this.changes = read.changes;
     this.all = read.all;
-    $('changes').replaceChildren(...this.changes.slice(0, MOST_LISTED).map((change, k) => {
+    $('changes').replaceChildren(...this.changes.slice(0, MAX_LISTED).map((change, k) => {
       const [row, button] = ['li', 'button'].map((tag) => document.createElement(tag));
       const size = change.bounds_m.max.map((high, axis) => (high - change.bounds_m.min[axis]).toFixed(1));
       button.append(this.swatchOf(CLASSES[change.kind === 'appeared' ? 1 : 2]), `${change.number} ${change.kind} ${size.join(' x ')} m`);

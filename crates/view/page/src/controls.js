@@ -2,7 +2,7 @@
 
 import { app, comparison, ground, viewer } from './app.js';
 import { colour, paint } from './colours.js';
-import { applyOverviews, cut } from './cut.js';
+import { loadOverviews, cut } from './cut.js';
 import { followCamera } from './distance_slice.js';
 import { $ } from './dom.js';
 import { showPanel } from './drawer.js';
@@ -39,13 +39,13 @@ $('grid').addEventListener('change', () => {
 for (const id of ['snapshot', 'since', 'swiped']) {
   $(id).addEventListener('change', () => {
     showMaps();
-    applyOverviews();
+    loadOverviews();
   });
 }
 $('compared').addEventListener('change', async () => {
   await readCompared();
   showMaps();
-  applyOverviews();
+  loadOverviews();
 });
 
 $('shot').addEventListener('click', () => {

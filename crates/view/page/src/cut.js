@@ -70,13 +70,18 @@ export function cut() {
   remember();
 }
 
-// Applies the ceilings and the heights of what is shown.
-export async function applyOverviews(overviews = readOverviews()) {
-  cut();
-  await overviews;
+// Applies the ceilings and the heights of what is shown, as far as they are read.
+export function applyOverviews() {
+  if (viewer.layers.length === 0) return;
   surround();
   cut();
   paint();
+}
+
+// Applies the ceilings and the heights of what is shown now, and again when they are read.
+export function loadOverviews() {
+  applyOverviews();
+  return readOverviews(applyOverviews);
 }
 
 for (const id of CUTS) $(id).addEventListener('input', cut);

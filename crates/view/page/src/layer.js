@@ -7,18 +7,18 @@ import { KIND, parseNode } from './node.js';
 import { bytesOf, meshOf } from './mesh.js';
 import { makeMaterial, tintLayer } from './material.js';
 
-const MOST_DRAWN = 180;
+const MAX_DRAWN = 180;
 // Nodes of loaded files that take part in an update at once.
-const MOST_PROCESSED = 5000;
+const MAX_PROCESSED = 5000;
 const BEST_ERROR = 2;
-const MOST_ERROR = 4096;
+const MAX_ERROR = 4096;
 // Factor between levels of detail.
 const STEP = 1.07;
 // Maximum number of tiles with free or unknown voxels.
-const MOST_NEAR = 24;
+const MAX_NEAR = 24;
 // Failed requests are retried with increasing delay.
-const FIRST_RETRY_MS = 2000;
-const LAST_RETRY_MS = 60000;
+export const FIRST_RETRY_MS = 2000;
+export const LAST_RETRY_MS = 60000;
 
 // One state of a map; nodes are loaded and removed as the camera moves.
 export class Layer {
@@ -48,7 +48,7 @@ export class Layer {
     const tiles = new TilesRenderer(`maps/${this.id}/tileset.json`);
     const { legend } = this;
     tiles.layerName = legend && this.layerName;
-    Object.assign(tiles, queues, { maxTilesProcessed: MOST_PROCESSED });
+    Object.assign(tiles, queues, { maxTilesProcessed: MAX_PROCESSED });
     tiles.errorTarget = BEST_ERROR;
     tiles.registerPlugin({
       preprocessURL: (url) => {
@@ -200,13 +200,13 @@ export class Layer {
     // Does not retry a level that was too fine until the view changes, to avoid flicker.
     const view = [...viewer.camera.matrixWorld.elements, viewer.canvas.width, viewer.canvas.height].join();
     if (view !== this.view) [this.view, this.finest] = [view, BEST_ERROR];
-    const share = MOST_DRAWN / viewer.layers.length;
+    const share = MAX_DRAWN / viewer.layers.length;
     const before = tiles.errorTarget;
     let isFull = isFrame && cache.isFull();
     for (;;) {
       const { errorTarget } = tiles;
       const needed = Math.max(...all.map((layer) => layer.needed));
-      if (needed > share || isFull) tiles.errorTarget = this.finest = Math.min(STEP * errorTarget, MOST_ERROR);
+      if (needed > share || isFull) tiles.errorTarget = this.finest = Math.min(STEP * errorTarget, MAX_ERROR);
       else if (needed < 0.6 * share) tiles.errorTarget = Math.max(Math.min(this.finest, errorTarget), errorTarget / STEP);
       isFull = false;
       if (tiles.errorTarget === errorTarget) break;
@@ -267,7 +267,7 @@ export class Layer {
     if (kinds.length) {
       const leaves = this.meshes().filter(([mesh]) => mesh.userData.node.edge < 1.5 * this.map.resolution_m);
       leaves.sort((a, b) => a[1].traversal.distanceFromCamera - b[1].traversal.distanceFromCamera);
-      for (const [, tile] of leaves.slice(0, MOST_NEAR)) {
+      for (const [, tile] of leaves.slice(0, MAX_NEAR)) {
         for (const kind of kinds) wanted.add(`${new URL(tile.content.uri, tile.internal.basePath + '/').href}&what=${kind}`);
       }
     }

@@ -1,11 +1,11 @@
 // Follows changes of the maps.
 
 import { app, viewer } from './app.js';
-import { loadLegend, paint } from './colours.js';
-import { applyOverviews, cut } from './cut.js';
+import { loadLegend } from './colours.js';
+import { loadOverviews } from './cut.js';
 import { loadDistances } from './distance_slice.js';
 import { $, say } from './dom.js';
-import { readExtents, readMaps, showMaps, states, surround } from './maps.js';
+import { readExtents, readMaps, showMaps, states } from './maps.js';
 import { loadMoving } from './moving_points.js';
 import { readPath } from './trajectory.js';
 import { isAtStart, start } from './views.js';
@@ -55,16 +55,13 @@ async function change() {
   const changed = before.filter((was) => app.maps.some(({ id, generation }) => id === was.id && generation !== was.generation));
   // While the map is read for the first time, its box grows.
   if (changed.some(({ generation, low, high, pending_tiles: pending }) => generation === 0 || low === high || (pending > 0 && isAtStart()))) start();
-  else surround();
   // While the map is read for the first time, its new generations are not flushes.
   if (changed.some((was) => was.pending_tiles === 0 && was.generation > 0)) {
     $('live').hidden = false;
     $('live').title = `flush ${Math.max(...app.maps.map(({ generation }) => generation))}`;
   }
-  cut();
-  paint();
+  loadOverviews();
   readPath();
-  applyOverviews();
   loadMoving();
   loadDistances();
 }

@@ -1,16 +1,17 @@
-// Queues of the nodes to load, and their cache. By default, the renderer runs jobs in frames only, which are rare where
-// drawing is slow.
+// Queues of the nodes to load, and their cache. Jobs run between frames: by default, the renderer would start them only
+// in frames, which are rare where drawing is slow.
 
 import { DEFAULT_LRU_CACHE, PriorityQueue } from '3d-tiles-renderer';
 
 // Maximum memory of the nodes of all layers.
-const MOST_BYTES = 256 * 2 ** 20;
+const MAX_BYTES = 256 * 2 ** 20;
 
-// Browsers open six connections to a server: some more requests keep them busy. Queued requests can be cancelled.
-const MOST_REQUESTS = 10;
+// Maximum number of requests at once. Browsers open six connections to a server; a few requests more keep these busy.
+// The others wait in the queue, where they can be cancelled.
+const MAX_REQUESTS = 10;
 
-// Returns whether one tile is more urgent than another, as a positive number, or less, as a negative one: those in view,
-// files of further levels, coarse nodes, near nodes.
+// Compares two tiles: positive if the first one is more urgent, negative if the second one is. What is in view is more
+// urgent, then files of further levels, then coarse nodes, then near ones.
 function urgency(one, other) {
   const [a, b] = [one.traversal, other.traversal];
   return a.used - b.used || a.inFrustum - b.inFrustum
@@ -37,7 +38,7 @@ class BetweenFrames extends PriorityQueue {
 // Requests to one server.
 class Requests {
   constructor() {
-    this.queue = new BetweenFrames(MOST_REQUESTS);
+    this.queue = new BetweenFrames(MAX_REQUESTS);
   }
 
   get running() {
@@ -57,4 +58,4 @@ class Requests {
 export const queues = { downloadQueue: new Requests(), parseQueue: new BetweenFrames(16) };
 
 // Cache of all layers.
-export const cache = Object.assign(DEFAULT_LRU_CACHE, { maxBytesSize: MOST_BYTES, minBytesSize: 0.75 * MOST_BYTES });
+export const cache = Object.assign(DEFAULT_LRU_CACHE, { maxBytesSize: MAX_BYTES, minBytesSize: 0.75 * MAX_BYTES });

@@ -1,10 +1,10 @@
 // Starts the page.
 
 import { app } from './app.js';
-import { applyOverviews } from './cut.js';
+import { applyOverviews, loadOverviews } from './cut.js';
 import { $, chooseOption, say } from './dom.js';
 import { follow } from './live.js';
-import { readExtents, readMaps, readOverviews, showMaps } from './maps.js';
+import { readExtents, readMaps, showMaps } from './maps.js';
 import { readPath } from './trajectory.js';
 import { applyLink } from './view_link.js';
 import { start } from './views.js';
@@ -16,23 +16,27 @@ import './measure.js';
 import './moving_points.js';
 import './query.js';
 
-// Maximum time to wait for ceilings, so that a large map is shown at once.
+// Maximum time that the first view waits for the ceiling, so that a large map is shown at once.
 const OVERVIEW_MS = 1000;
 
 async function run() {
   chooseOption('compared', app.link.compared);
   await readMaps();
-  // The first view is one of the trajectory, without a ceiling.
-  const path = readPath();
-  const overviews = readOverviews();
-  await readExtents();
+  // The link chooses the states to read.
   applyLink();
+  // The first view is across the trajectory, and hides the ceiling: it needs both.
+  const path = readPath();
+  const extents = readExtents();
+  const overviews = loadOverviews();
+  await extents;
   await path;
-  // The server has to read some tiles for it.
-  await Promise.race([overviews, new Promise((resolve) => { setTimeout(resolve, OVERVIEW_MS); })]);
+  // The server reads some tiles to find the ceiling. Several maps are shown with their ceilings.
+  if (app.maps.length === 1) {
+    await Promise.race([overviews, new Promise((resolve) => { setTimeout(resolve, OVERVIEW_MS); })]);
+  }
   start();
   showMaps();
-  applyOverviews(overviews);
+  applyOverviews();
   if (app.maps.every((map) => map.tiles === 0)) say('This map is empty.');
   follow();
 }

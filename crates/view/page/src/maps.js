@@ -3,7 +3,8 @@
 import { app, comparison, ground, swipe, viewer } from './app.js';
 import { legendOf, loadLegend, paint } from './colours.js';
 import { loadDistances } from './distance_slice.js';
-import { $, json, swatchOf } from './dom.js';
+import { $, json, say, swatchOf } from './dom.js';
+import { FIRST_RETRY_MS, LAST_RETRY_MS } from './layer.js';
 import { BY_LAYER } from './layers.js';
 import { catchUp } from './live.js';
 import { loadMoving } from './moving_points.js';
@@ -77,10 +78,7 @@ function describe() {
 
 export async function readMaps() {
   const listed = await json('maps.json');
-  const before = app.maps;
   app.maps = comparison.mapsOf(listed);
-  // Until it is read again.
-  for (const map of app.maps) map.overview = before.find(({ id }) => id === map.id)?.overview ?? null;
   if (app.colourMaps.length === 0) {
     app.colourMaps = listed.color_maps;
     $('ramp').replaceChildren(...app.colourMaps.map(({ name }) => new Option(name, name)));
@@ -136,17 +134,54 @@ export function mostOf() {
   return [{ min: end('min', Math.min), max: end('max', Math.max) }, points];
 }
 
-// Returns the heights of most voxels of a map.
-export const heightsOf = (map) => map.overview?.heights_m ?? map.survey?.heights ?? [map.low, map.high];
+// Ceilings of rooms and heights of most voxels, by state, as they were read last; the states to read; and the time
+// until failed requests are retried.
+const overviews = new Map();
+const unread = new Set();
+let reading = null;
+let retryTimer = 0;
+let retryMs = FIRST_RETRY_MS;
 
-// Reads the ceilings of rooms, and the heights of most voxels.
-export async function readOverviews() {
-  await Promise.all(app.maps.map(async (map) => {
-    const id = idOf(map).split('~')[0];
-    const found = await json(`maps/${id}/overview.json`).catch(() => null);
-    // Ignore the response to an older request.
-    if (found && id === idOf(map).split('~')[0]) map.overview = found;
-  }));
+const stateOf = (map) => idOf(map).split('~')[0];
+
+// Returns the overview of the shown state of a map. Compared maps have none: those of each would give them different
+// colours.
+const overviewOf = (map) => (comparison.info ? undefined : overviews.get(stateOf(map)));
+
+// Returns the heights of most voxels of a map.
+export const heightsOf = (map) => overviewOf(map)?.heights_m ?? map.survey?.heights ?? [map.low, map.high];
+
+// Reads the overviews of the shown states, and calls `apply` after each. The server computes one at a time, so that the
+// others would only keep the browser's connections from loading voxels.
+export function readOverviews(apply) {
+  clearTimeout(retryTimer);
+  const shown = comparison.info ? [] : app.maps.map(stateOf);
+  for (const state of unread) if (!shown.includes(state)) unread.delete(state);
+  for (const state of shown) unread.add(state);
+  if (unread.size > 0) reading ??= readUnread(apply);
+  return reading;
+}
+
+async function readUnread(apply) {
+  let hasFailed = false;
+  // States that are added in the meantime follow.
+  for (const state of unread) {
+    unread.delete(state);
+    try {
+      overviews.set(state, await json(`maps/${state}/overview.json`));
+    } catch (error) {
+      // A snapshot may have been deleted.
+      if (!app.maps.some((map) => stateOf(map) === state)) continue;
+      say(`Cannot load the ceiling and the range of heights: ${error.message}`);
+      hasFailed = true;
+      continue;
+    }
+    apply();
+  }
+  reading = null;
+  clearTimeout(retryTimer);
+  if (hasFailed) retryTimer = setTimeout(() => readOverviews(apply), retryMs);
+  retryMs = hasFailed ? Math.min(2 * retryMs, LAST_RETRY_MS) : FIRST_RETRY_MS;
 }
 
 export function surround() {
@@ -158,7 +193,7 @@ export function surround() {
 
 // Returns the height above which the ceiling is hidden; `null` for maps without one, and if it is shown.
 export function ceiling() {
-  const at = app.maps.length === 1 && !app.showsCeiling && !comparison.info ? app.maps[0].overview?.ceiling_m ?? null : null;
+  const at = app.maps.length === 1 && !app.showsCeiling && !comparison.info ? overviewOf(app.maps[0])?.ceiling_m ?? null : null;
   $('ceiling').hidden = at === null;
   return at;
 }

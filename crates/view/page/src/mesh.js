@@ -28,11 +28,12 @@ function ofCorners(count, slots, numberOf, isNormalized = false) {
 // Order of the directions of faces (+x -x +y -y +z -z) in a mesh, so that those on one side of it are adjacent.
 const ORDER = [0, 2, 4, 1, 3, 5];
 
-// Faces of a node by direction. A camera sees at most half of the directions of a node beside it.
+// Faces of a node by direction. A camera outside of a node sees faces of three directions at most.
 class Sides {
   constructor({ count, places }) {
     this.counts = new Array(6).fill(0);
-    // The plane from which on a camera sees some faces of a direction.
+    // Coordinate of the rearmost faces of each direction: a camera behind them sees none. Faces to +x are visible only
+    // from a greater x, faces to -x only from a smaller one.
     this.planes = [0, 1, 2, 3, 4, 5].map((side) => (side & 1 ? -Infinity : Infinity));
     for (let k = 0; k < count; k++) {
       const side = places[k] >>> 24;

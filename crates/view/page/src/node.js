@@ -3,9 +3,9 @@
 import { bytesOfValues, parseValues } from './layers.js';
 
 const HEAD = 64;
-// Maximum edge length, with a margin on each side for neighbours.
-const MOST = 130;
-const grid = new Uint16Array(MOST * MOST * MOST);
+// Maximum edge length of a node in voxels, with a margin on each side for neighbours.
+const MAX_EDGE = 130;
+const grid = new Uint16Array(MAX_EDGE * MAX_EDGE * MAX_EDGE);
 
 export const KIND = { occupied: 0, free: 1, unknown: 2, change: 3, compared: 4 };
 
@@ -42,11 +42,21 @@ export function parseNode(buffer) {
   };
 }
 
-const cell = (x, y, z) => x + 1 + MOST * (y + 1 + MOST * (z + 1));
-const BESIDE = [1, -1, MOST, -MOST, MOST * MOST, -MOST * MOST];
+const cell = (x, y, z) => x + 1 + MAX_EDGE * (y + 1 + MAX_EDGE * (z + 1));
+const BESIDE = [1, -1, MAX_EDGE, -MAX_EDGE, MAX_EDGE * MAX_EDGE, -MAX_EDGE * MAX_EDGE];
 
-// Faces of the current node, before their number is known.
-let faces = { voxels: new Uint32Array(0), places: new Uint32Array(0), levels: new Uint32Array(0) };
+// Buffers for the faces of a node, whose number is known only at the end. Those of up to 6 MiB are used again.
+const KEPT_FACES = 1 << 19;
+let buffers = null;
+
+// Returns buffers for twice as many faces, with the same contents.
+function grown(before) {
+  return before.map((old) => {
+    const numbers = new Uint32Array(2 * old.length);
+    numbers.set(old);
+    return numbers;
+  });
+}
 
 // Returns the faces that any threshold can make visible, four bytes in a number for each: position and direction
 // (`places`: x, y, z, +x -x +y -y +z -z), the value of the voxel, that of its neighbour plus one (0 without a neighbour),
@@ -55,10 +65,8 @@ let faces = { voxels: new Uint32Array(0), places: new Uint32Array(0), levels: ne
 // and none of its neighbour.
 export function facesOf({ count, x, y, z, value, counts, kind }) {
   const isCompared = kind === KIND.compared;
-  if (faces.voxels.length < 6 * count) {
-    faces = { voxels: new Uint32Array(6 * count), places: new Uint32Array(6 * count), levels: new Uint32Array(6 * count) };
-  }
-  const { voxels, places, levels } = faces;
+  buffers ??= [0, 1, 2].map(() => new Uint32Array(1 << 14));
+  let [voxels, places, levels] = buffers;
   for (let i = 0; i < count; i++) grid[cell(x[i], y[i], z[i])] = kind === KIND.occupied ? value[i] + 1 : isCompared ? value[i] : 256;
   let n = 0;
   for (let i = 0; i < count; i++) {
@@ -67,6 +75,7 @@ export function facesOf({ count, x, y, z, value, counts, kind }) {
     for (let side = 0; side < 6; side++) {
       const beside = grid[at + BESIDE[side]];
       if (isCompared ? (own & ~beside) === 0 : beside >= own) continue;
+      if (n === voxels.length) [voxels, places, levels] = grown([voxels, places, levels]);
       voxels[n] = i;
       places[n] = x[i] | y[i] << 8 | z[i] << 16 | side << 24;
       levels[n] = value[i] | beside << 8 | counts[i] << 16;
@@ -74,6 +83,7 @@ export function facesOf({ count, x, y, z, value, counts, kind }) {
     }
   }
   for (let i = 0; i < count; i++) grid[cell(x[i], y[i], z[i])] = 0;
+  buffers = voxels.length > KEPT_FACES ? null : [voxels, places, levels];
   return { voxels, places, levels, count: n };
 }
 

@@ -1,10 +1,10 @@
 // Time that drawing takes, and timers of what happens between frames.
 
-// Frames with smooth edges that take longer are too slow while the view changes.
+// Maximum time of a frame with smooth edges while the view changes.
 const SLOW_MS = 80;
-// Still views get smooth edges if this takes less time: input has to wait for it.
-const MOST_SMOOTH_MS = 700;
-// Software takes up to three times longer for smooth edges.
+// Maximum time of a frame with smooth edges while the view is still: input has to wait for it.
+const MAX_SMOOTH_MS = 700;
+// Frames with smooth edges take about three times longer where the processor draws.
 const SMOOTH_FACTOR = 3;
 // Interval of checks whether a frame is drawn.
 const CHECK_MS = 10;
@@ -13,14 +13,25 @@ const CHECK_MS = 10;
 export class Pace {
   constructor(gl) {
     this.gl = gl;
+    // Time of the last measured frame.
     this.drawMs = 0;
+    // Expected time of a frame with smooth edges.
+    this.smoothMs = 0;
+    // Whether frames with smooth edges are too slow while the view changes.
     this.isSlow = false;
+    // Whether the last frame has smooth edges.
+    this.isSmooth = false;
+    // Fence after the frame that is measured; `null` between measurements.
     this.drawn = null;
   }
 
-  // Whether a still view is worth the time of smooth edges.
+  get isMeasuring() {
+    return this.drawn !== null;
+  }
+
+  // Whether a still view should be drawn again, with smooth edges.
   get mayBeSmooth() {
-    return this.isSlow && SMOOTH_FACTOR * this.drawMs < MOST_SMOOTH_MS;
+    return !this.isSmooth && this.smoothMs < MAX_SMOOTH_MS;
   }
 
   begin(isSmooth) {
@@ -30,26 +41,38 @@ export class Pace {
 
   end() {
     // One frame is measured at a time.
-    if (this.drawn) return;
+    if (this.isMeasuring) return;
     const { gl, since, isSmooth } = this;
     this.drawn = gl.fenceSync(gl.SYNC_GPU_COMMANDS_COMPLETE, 0);
     gl.flush();
+    // Time for which the frame is known to be not drawn. Decoding of nodes may delay the next check.
+    let leastMs = 0;
     const check = () => {
       if (!this.drawn) return;
+      const ms = performance.now() - since;
       if (gl.clientWaitSync(this.drawn, 0, 0) === gl.TIMEOUT_EXPIRED) {
+        leastMs = ms;
         setTimeout(check, CHECK_MS);
         return;
       }
       gl.deleteSync(this.drawn);
       this.drawn = null;
-      this.drawMs = performance.now() - since;
-      if (isSmooth || this.isSlow) this.isSlow = this.drawMs > (isSmooth ? SLOW_MS : SLOW_MS / SMOOTH_FACTOR);
+      this.record(leastMs, ms, isSmooth);
     };
     setTimeout(check);
   }
+
+  // Records a frame that took from `leastMs` to `mostMs`.
+  record(leastMs, mostMs, isSmooth) {
+    this.drawMs = mostMs;
+    this.smoothMs = leastMs * (isSmooth ? 1 : SMOOTH_FACTOR);
+    // Only frames with smooth edges tell how long these take. Once they are too slow, a moving view has none until it is
+    // still and is drawn with smooth edges again: they would flicker.
+    if (isSmooth) this.isSlow = mostMs > SLOW_MS;
+  }
 }
 
-// Timers by name. A timer that runs is kept.
+// Timers by name. Setting one that already runs has no effect.
 export class Timers {
   constructor() {
     this.running = new Map();

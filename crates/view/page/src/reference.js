@@ -3,11 +3,13 @@
 import * as THREE from 'three';
 
 // Cells of the longer side.
-const MOST_CELLS = 192;
+const MAX_CELLS = 192;
 // Maximum width of buildings, in metres.
 const NARROW_M = 40;
-// Longer steps than this many usual ones are jumps, such as the start of another recording.
+// Steps that are longer than this many usual ones, and than this length, are jumps, such as the start of another
+// recording.
 const JUMP_STEPS = 8;
+const MIN_JUMP_M = 5;
 
 // Fills cells without a height from the nearest ones with one.
 function spread(heights, width) {
@@ -46,11 +48,12 @@ function extremes(heights, width, reach, of) {
 // Returns the horizontal length of the step to each position.
 const lengthsOf = (path) => path.map((at, k) => (k ? Math.hypot(at[0] - path[k - 1][0], at[1] - path[k - 1][1]) : 0));
 
-// Returns the positions after jumps. Usual steps are at least so many metres.
+// Returns the positions after jumps. Usual steps are at least `least` metres: the edge of two voxels. The usual step is
+// the median without those of less than a tenth of a voxel, because a sensor may stand still most of the time.
 export function startsOf(path, least) {
   const lengths = lengthsOf(path);
-  const sorted = Float64Array.from(lengths.slice(1)).sort();
-  const longest = JUMP_STEPS * Math.max(sorted[Math.floor(sorted.length / 2)] ?? 0, least);
+  const sorted = Float64Array.from(lengths.filter((length) => length > 0.05 * least)).sort();
+  const longest = Math.max(JUMP_STEPS * Math.max(sorted[Math.floor(sorted.length / 2)] ?? 0, least), MIN_JUMP_M);
   return lengths.flatMap((length, k) => (length > longest ? [k] : []));
 }
 
@@ -60,7 +63,7 @@ export class Reference {
   constructor(bounds, path, resolution) {
     this.isOfTrajectory = path.length > 0;
     const size = [0, 1].map((axis) => Math.max(bounds.max[axis] - bounds.min[axis], 1e-3));
-    this.cell = Math.max(Math.max(...size) / MOST_CELLS, 2 * resolution);
+    this.cell = Math.max(Math.max(...size) / MAX_CELLS, 2 * resolution);
     this.low = bounds.min.slice(0, 2);
     [this.width, this.height] = size.map((length) => Math.ceil(length / this.cell) + 1);
     // Heights that are known, and the voxels' edge that they are known to.

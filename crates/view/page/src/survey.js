@@ -4,7 +4,7 @@ import { contentOf } from './content.js';
 import { parseNode } from './node.js';
 
 // Number of voxels of the first view, sampled evenly.
-const MOST_POINTS = 4000;
+const MAX_POINTS = 4000;
 const share = (sorted, at) => sorted[Math.min(Math.floor(at * sorted.length), sorted.length - 1)];
 
 // Returns the 2nd and the 98th percentile; `null` of no values.
@@ -43,7 +43,7 @@ export async function survey({ root }, base) {
   const [min, max] = [0, 1].map((end) => ends.map((pair) => pair[end]));
   const isInside = (k) => along.every((values, axis) => values[k] >= min[axis] && values[k] <= max[axis]);
   const inside = counts.flatMap((_, k) => (isInside(k) ? [k] : []));
-  const step = Math.max(Math.floor(inside.length / MOST_POINTS), 1);
+  const step = Math.max(Math.floor(inside.length / MAX_POINTS), 1);
   const points = inside.filter((_, k) => k % step === 0).map((k) => along.map((values) => values[k]));
   const [low, high] = percentiles(along[2]);
   return { edge, along, core: { min, max }, points, heights: [low - edge / 2, high + edge / 2], counts: percentiles(counts) };

@@ -2,7 +2,7 @@
 
 import { app, comparison, swipe, viewer } from './app.js';
 import { chooseRamp } from './colours.js';
-import { cut, CUTS, OPEN } from './cut.js';
+import { CUTS, loadOverviews, OPEN } from './cut.js';
 import { $, chooseOption } from './dom.js';
 import { readLink, writeLink } from './link.js';
 import { readCompared, showMaps } from './maps.js';
@@ -51,7 +51,7 @@ window.addEventListener('hashchange', async () => {
   applyLink();
   start();
   showMaps();
-  cut();
+  loadOverviews();
 });
 
 swipe.moved = remember;

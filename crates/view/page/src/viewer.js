@@ -9,9 +9,9 @@ import { OF_FIRST_MAP, Overlays } from './overlays.js';
 import { Pace, Timers } from './pace.js';
 import { Shading } from './shading.js';
 
-const MOST_CALLS = 200;
+const MAX_CALLS = 200;
 // Maximum pause between frames while nodes are loaded.
-const MOST_PAUSE_MS = 2000;
+const MAX_PAUSE_MS = 2000;
 // Interval of updates of the nodes to load.
 const LOAD_MS = 16;
 // Time without a change after which edges are smoothed, where drawing is slow.
@@ -149,7 +149,7 @@ export class Viewer {
     if (this.waits) return;
     this.settled = false;
     const isLoading = this.layers.some(({ tiles }) => !Layer.isIdle(tiles));
-    const pause = isLoading ? Math.min(5 * this.pace.drawMs, MOST_PAUSE_MS) : 0;
+    const pause = isLoading ? Math.min(5 * this.pace.drawMs, MAX_PAUSE_MS) : 0;
     this.timers.set('frame', () => this.wake(), Math.max(60, pause));
   }
 
@@ -189,15 +189,22 @@ export class Viewer {
     // The view is settled after a frame in which no node is pending and the camera does not move.
     this.settled = this.isReady && !moved;
     for (const listener of this.listeners) listener(this);
-    if (this.settled) this.timers.set('smooth', () => this.smooth(), SMOOTH_AFTER_MS);
+    if (this.settled) this.smoothLater();
     else if (moved) this.wake();
     else this.wakeSoon();
     if (!this.isReady) this.loadSoon();
   }
 
-  // Draws a settled view again with smooth edges, if frames have none because drawing is slow.
+  smoothLater() {
+    this.timers.set('smooth', () => this.smooth(), SMOOTH_AFTER_MS);
+  }
+
+  // Draws a settled view again with smooth edges, if its last frame has none because drawing is slow.
   smooth() {
-    if (this.settled && this.pace.mayBeSmooth) this.draw();
+    if (!this.settled) return;
+    // The time of the last frame is not known yet.
+    if (this.pace.isMeasuring) this.smoothLater();
+    else if (this.pace.mayBeSmooth) this.draw();
   }
 
   // First column of pixels of the later state.
@@ -239,7 +246,7 @@ export class Viewer {
   leaveOutFarthest() {
     const near = this.layers.reduce((sum, layer) => sum + (layer.isShown ? layer.near.children.length : 0), 0);
     const shown = this.layers.filter((layer) => layer.isShown).flatMap((layer) => layer.meshes());
-    const most = MOST_CALLS - (this.isSplit ? 2 : 1) * OVERLAY_CALLS - near;
+    const most = MAX_CALLS - (this.isSplit ? 2 : 1) * OVERLAY_CALLS - near;
     if (shown.length > most) shown.sort((a, b) => a[1].traversal.distanceFromCamera - b[1].traversal.distanceFromCamera);
     shown.forEach(([mesh], k) => { mesh.visible = k < most; });
   }

@@ -8,7 +8,7 @@ import { obliqueOf } from './survey.js';
 // Earlier views, and when the last one was left.
 const views = [];
 let leftAt = 0;
-const MOST_VIEWS = 50;
+const MAX_VIEWS = 50;
 // Camera of the first view.
 let startedAt = '';
 const pose = () => JSON.stringify([viewer.camera.position, viewer.flight.orbit.target]);
@@ -40,7 +40,7 @@ function keepView() {
   const now = performance.now();
   if (now - leftAt > 500) views.push([viewer.camera.position, viewer.flight.orbit.target].map((at) => viewer.toMap(at.toArray())));
   leftAt = now;
-  if (views.length > MOST_VIEWS) views.shift();
+  if (views.length > MAX_VIEWS) views.shift();
   $('back').disabled = false;
 }
 
