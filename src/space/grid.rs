@@ -155,12 +155,12 @@ impl Grid {
     /// Converts a point to units of voxels: its floor is the voxel index.
     #[inline]
     pub fn to_voxel_units(&self, point_m: Point) -> Point {
-        point_m.map(|coordinate| self.to_voxel_unit(coordinate))
+        point_m.map(|coordinate| self.voxel_unit_of(coordinate))
     }
 
-    /// One coordinate of [`Grid::to_voxel_units`].
+    /// Returns a coordinate in units of voxels, like [`Grid::to_voxel_units`].
     #[inline]
-    pub(crate) fn to_voxel_unit(&self, coordinate_m: f64) -> f64 {
+    pub(crate) fn voxel_unit_of(&self, coordinate_m: f64) -> f64 {
         coordinate_m * self.inv_resolution
     }
 

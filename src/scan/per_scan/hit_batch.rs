@@ -56,11 +56,10 @@ impl HitBatch {
         if are_hits[..self.len].iter().fold(1, |all, is_hit| all & is_hit) == 1 {
             return;
         }
-        let before = self.len;
-        self.len = 0;
-        for row in 0..before {
+        let before = std::mem::take(&mut self.len);
+        for (row, is_hit) in are_hits.into_iter().enumerate().take(before) {
             let point = self.point(row);
-            match are_hits[row] {
+            match is_hit {
                 0 => visit(point),
                 _ => _ = self.push(point),
             }
@@ -71,7 +70,7 @@ impl HitBatch {
     pub(crate) fn find_rays(&mut self, grid: &Grid, origin: &RayOrigin) {
         for axis in 0..3 {
             for (point, voxel) in self.points[axis].iter_mut().zip(&mut self.voxels[axis]) {
-                *point = grid.to_voxel_unit(*point);
+                *point = grid.voxel_unit_of(*point);
                 *voxel = Grid::floor_of_fitting(*point);
             }
         }

@@ -181,7 +181,7 @@ impl<'a> ScanRays<'a> {
             let (mut hits, mut ends) = (self.no_hits(layers), Vec::new());
             let mut report = ScanReport { points: range.len() as u64, ..ScanReport::default() };
             let mut batch = Vec::with_capacity(BATCH);
-            let mut hit_batch = self.are_hits_whole(layers).then(Box::<HitBatch>::default);
+            let mut hit_batch = self.takes_batches(layers).then(Box::<HitBatch>::default);
             let (mut seen, mut extend_at) = (0, 0);
             let mut marks = ChunkMarks::from(self.points.moving(), range.start);
             self.for_each_attributed_chunk(layers, range, &mut |points, intensities, attributes| {
@@ -248,9 +248,11 @@ impl<'a> ScanRays<'a> {
         Ok((&mut collectors[..threads], all.0, all.1))
     }
 
-    /// Returns whether each point that the range rule makes a hit is one, with a whole ray.
-    fn are_hits_whole(&self, layers: Layers) -> bool {
-        self.all_in_reach
+    /// Returns whether points can be taken in batches: each point that the range rule makes a hit is one, with a whole
+    /// ray, and there are enough of them.
+    fn takes_batches(&self, layers: Layers) -> bool {
+        self.points.len() >= BATCH
+            && self.all_in_reach
             && self.cut.is_none()
             && layers.is_none()
             && self.points.moving().is_none()
