@@ -45,30 +45,28 @@ export class Pace {
     const { gl, since, isSmooth } = this;
     this.drawn = gl.fenceSync(gl.SYNC_GPU_COMMANDS_COMPLETE, 0);
     gl.flush();
-    // Time for which the frame is known to be not drawn. Decoding of nodes may delay the next check.
-    let leastMs = 0;
     const check = () => {
       if (!this.drawn) return;
       const ms = performance.now() - since;
       if (gl.clientWaitSync(this.drawn, 0, 0) === gl.TIMEOUT_EXPIRED) {
-        leastMs = ms;
         setTimeout(check, CHECK_MS);
         return;
       }
       gl.deleteSync(this.drawn);
       this.drawn = null;
-      this.record(leastMs, ms, isSmooth);
+      this.record(ms, isSmooth);
     };
     setTimeout(check);
   }
 
-  // Records a frame that took from `leastMs` to `mostMs`.
-  record(leastMs, mostMs, isSmooth) {
-    this.drawMs = mostMs;
-    this.smoothMs = leastMs * (isSmooth ? 1 : SMOOTH_FACTOR);
+  // Records a frame that took at most this long. Decoding of nodes may delay the check; while a view is still, nothing
+  // is decoded.
+  record(ms, isSmooth) {
+    this.drawMs = ms;
+    this.smoothMs = ms * (isSmooth ? 1 : SMOOTH_FACTOR);
     // Only frames with smooth edges tell how long these take. Once they are too slow, a moving view has none until it is
     // still and is drawn with smooth edges again: they would flicker.
-    if (isSmooth) this.isSlow = mostMs > SLOW_MS;
+    if (isSmooth) this.isSlow = ms > SLOW_MS;
   }
 }
 
