@@ -446,6 +446,13 @@ mod tests {
             let collected: TileTable<TileVersion> = naive.iter().map(|(tile, value)| (*tile, *value)).collect();
             prop_assert!(collected == table && collected.len() == naive.len());
             prop_assert!(table.tiles().eq(naive.keys().copied()));
+            // Internal iteration, from the first tile and from a later one.
+            for first in [0, 1, naive.len() / 2] {
+                let (mut tiles, mut left) = (Vec::new(), table.tiles());
+                (0..first).for_each(|_| _ = left.next());
+                left.for_each(|tile| tiles.push(tile));
+                prop_assert!(tiles.iter().eq(naive.keys().skip(first)));
+            }
             prop_assert!(table.iter().eq(naive));
         }
     }

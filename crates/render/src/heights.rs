@@ -41,8 +41,8 @@ pub fn height_range_m(map: &dyn MapView, tiles: &[TileIndex]) -> Result<Option<[
     Ok(Some([grid.corner_m(low), grid.corner_m(high.saturating_add(1))]))
 }
 
-/// Returns the height of the voxel of a number, counted from 0.
-fn nth<'a>(mut counts: impl Iterator<Item = (&'a i32, &'a u64)>, number: u64) -> Option<i32> {
+/// Returns the height of voxel `number`, counted from 0, of voxels counted by height.
+pub(crate) fn nth<'a>(mut counts: impl Iterator<Item = (&'a i32, &'a u64)>, number: u64) -> Option<i32> {
     let mut before = 0;
     let found = counts.find(|(_, count)| {
         before += **count;

@@ -1,3 +1,4 @@
+use crate::heights::nth;
 use rayon::prelude::*;
 use std::collections::{BTreeMap, HashMap};
 use voxtile::mapper::MapView;
@@ -67,19 +68,12 @@ impl Roof {
         }
         let counts = stacks
             .par_iter()
-            .map(|(at, height_m)| columns_of(map, tiles.get(at).map_or(&[], Vec::as_slice), *height_m));
-        let columns: Vec<Column> = counts.collect::<Result<Vec<_>>>()?.concat();
-        let number = |is_counted: fn(&&Column) -> bool| columns.iter().filter(is_counted).count() as u64;
-        let mut ceilings_m: Vec<f64> = columns.iter().filter_map(|column| column.ceiling_m).collect();
-        ceilings_m.sort_unstable_by(f64::total_cmp);
-        Ok(Some(Self {
-            columns: number(|column| column.is_free),
-            roofed: number(|column| column.is_free && column.has_roof),
-            floored: number(|column| column.is_free && column.has_roof && column.has_floor),
-            sensor_m,
-            spread_m,
-            ceiling_m: ceilings_m.get(ceilings_m.len() / 10).copied().unwrap_or(f64::INFINITY),
-        }))
+            .map(|(at, height_m)| count(map, tiles.get(at).map_or(&[], Vec::as_slice), *height_m));
+        let Counts { columns, roofed, floored, ceilings } =
+            counts.try_reduce(Counts::default, |a, b| Ok(a.plus(b)))?;
+        let tenth = ceilings.values().sum::<u64>() / 10;
+        let ceiling_m = nth(ceilings.iter(), tenth).map_or(f64::INFINITY, |z| grid.corner_m(z));
+        Ok(Some(Self { columns, roofed, floored, sensor_m, spread_m, ceiling_m }))
     }
 
     /// Share of roofed columns, 0 to 1.
@@ -105,6 +99,35 @@ impl Roof {
     }
 }
 
+/// Columns of stacks of tiles; see [`Roof`].
+#[derive(Clone, Debug, Default)]
+struct Counts {
+    columns: u64,
+    roofed: u64,
+    floored: u64,
+    /// Number of columns by the height, in voxels, of the lowest occupied voxel well above the sensor.
+    ceilings: BTreeMap<i32, u64>,
+}
+
+impl Counts {
+    fn plus(mut self, other: Self) -> Self {
+        self.columns += other.columns;
+        self.roofed += other.roofed;
+        self.floored += other.floored;
+        other.ceilings.into_iter().for_each(|(z, count)| *self.ceilings.entry(z).or_default() += count);
+        self
+    }
+
+    fn add(&mut self, column: Column) {
+        self.columns += u64::from(column.is_free);
+        self.roofed += u64::from(column.is_free && column.has_roof);
+        self.floored += u64::from(column.is_free && column.has_roof && column.has_floor);
+        if let Some(z) = column.ceiling {
+            *self.ceilings.entry(z).or_default() += 1;
+        }
+    }
+}
+
 /// Column of half a metre in a stack of tiles.
 #[derive(Clone, Copy, Debug, Default)]
 struct Column {
@@ -114,14 +137,14 @@ struct Column {
     has_roof: bool,
     /// Whether it has an occupied voxel below the sensor.
     has_floor: bool,
-    /// Lower side of the lowest occupied voxel well above the sensor.
-    ceiling_m: Option<f64>,
+    /// Height of the lowest occupied voxel well above the sensor, in voxels.
+    ceiling: Option<i32>,
 }
 
-/// Returns the columns of a stack of tiles with a sensor at a height.
-fn columns_of(map: &dyn MapView, tiles: &[TileIndex], height_m: f64) -> Result<Vec<Column>> {
+/// Counts the columns of a stack of tiles with a sensor at a height.
+fn count(map: &dyn MapView, tiles: &[TileIndex], height_m: f64) -> Result<Counts> {
     let (grid, occupied_from) = (map.config().grid, map.config().occupied_log_odds());
-    let Some([_, _, sensor]) = grid.voxel_of([0.0, 0.0, height_m]) else { return Ok(Vec::new()) };
+    let Some([_, _, sensor]) = grid.voxel_of([0.0, 0.0, height_m]) else { return Ok(Counts::default()) };
     let away = (MAX_AWAY_M / grid.resolution_m()).min(1e9) as i32;
     let [lowest, highest] = [sensor.saturating_sub(away), sensor.saturating_add(away)];
     let wide = ((COLUMN_M / grid.resolution_m()).round().min(1e9) as i32).max(1);
@@ -159,15 +182,15 @@ fn columns_of(map: &dyn MapView, tiles: &[TileIndex], height_m: f64) -> Result<V
             {
                 column.has_floor |= z < sensor;
                 column.has_roof |= z > sensor;
-                let bottom_m = f64::from(z) * grid.resolution_m();
-                if bottom_m > height_m + MIN_CEILING_M {
-                    let lowest = column.ceiling_m.unwrap_or(f64::INFINITY);
-                    column.ceiling_m = Some(lowest.min(bottom_m));
+                if grid.corner_m(z) > height_m + MIN_CEILING_M {
+                    column.ceiling = Some(column.ceiling.map_or(z, |lowest| lowest.min(z)));
                 }
             }
         }
     }
-    Ok(columns)
+    let mut counts = Counts::default();
+    columns.into_iter().for_each(|column| counts.add(column));
+    Ok(counts)
 }
 
 fn median(mut heights: Vec<f64>) -> Option<f64> {

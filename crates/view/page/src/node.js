@@ -43,7 +43,8 @@ export function parseNode(buffer) {
 }
 
 const cell = (x, y, z) => x + 1 + MAX_EDGE * (y + 1 + MAX_EDGE * (z + 1));
-const BESIDE = [1, -1, MAX_EDGE, -MAX_EDGE, MAX_EDGE * MAX_EDGE, -MAX_EDGE * MAX_EDGE];
+// Steps to the six neighbours of a cell, by direction: +x -x +y -y +z -z.
+const NEIGHBOURS = [1, -1, MAX_EDGE, -MAX_EDGE, MAX_EDGE * MAX_EDGE, -MAX_EDGE * MAX_EDGE];
 
 // Buffers for the faces of a node, whose number is known only at the end. Those of up to 6 MiB are used again.
 const KEPT_FACES = 1 << 19;
@@ -73,12 +74,15 @@ export function facesOf({ count, x, y, z, value, counts, kind }) {
     const at = cell(x[i], y[i], z[i]);
     const own = grid[at];
     for (let side = 0; side < 6; side++) {
-      const beside = grid[at + BESIDE[side]];
-      if (isCompared ? (own & ~beside) === 0 : beside >= own) continue;
+      const neighbour = grid[at + NEIGHBOURS[side]];
+      // No threshold, or choice of classes, shows the voxel without its neighbour.
+      const isHidden = isCompared ? (own & ~neighbour) === 0 : neighbour >= own;
+      if (isHidden) continue;
       if (n === voxels.length) [voxels, places, levels] = grown([voxels, places, levels]);
       voxels[n] = i;
       places[n] = x[i] | y[i] << 8 | z[i] << 16 | side << 24;
-      levels[n] = value[i] | beside << 8 | counts[i] << 16;
+      // Below 256: a neighbour of 256 hides the face.
+      levels[n] = value[i] | neighbour << 8 | counts[i] << 16;
       n++;
     }
   }

@@ -64,8 +64,8 @@ export class Pace {
   record(ms, isSmooth) {
     this.drawMs = ms;
     this.smoothMs = ms * (isSmooth ? 1 : SMOOTH_FACTOR);
-    // Only frames with smooth edges tell how long these take. Once they are too slow, a moving view has none until it is
-    // still and is drawn with smooth edges again: they would flicker.
+    // Measured with smooth edges only. A slow page draws a moving view without them, and measures again when the view is
+    // still. If other frames counted, edges would flicker while the view moves.
     if (isSmooth) this.isSlow = ms > SLOW_MS;
   }
 }
