@@ -7,6 +7,7 @@ use super::{
 };
 use crate::config::{Clearing, Guard, InsertMode, RayConfig};
 use crate::error::Result;
+use crate::scan::ray::RayWalk;
 use crate::scratch::Scratch;
 use crate::sensor::{Iwlo, Observation, SensorModel};
 use crate::space::{
@@ -14,7 +15,7 @@ use crate::space::{
     places,
 };
 use proptest::prelude::*;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::io;
 use std::path::Path;
 
@@ -142,7 +143,21 @@ fn settings(tile_size_m: f64) -> Vec<Setting> {
     let mut guarded = setting((InsertMode::PerScan, UpdateOrder::OfVoxels));
     guarded.rays.clearing = Some(Clearing::Guarded(Guard::new(8).unwrap()));
     settings.push(guarded);
+    // Points are taken in batches.
+    let plain = setting((InsertMode::PerScan, UpdateOrder::OfVoxels));
+    settings.push(Setting { model: SensorModel::default(), ..plain });
     settings
+}
+
+/// The default model, whose points are taken in batches, with rays that are cut.
+fn batched() -> Setting {
+    Setting {
+        grid: Grid::new(0.1, 10.0).unwrap(),
+        model: SensorModel::default(),
+        rays: RayConfig { min_range_m: 0.2, max_range_m: Some(4.0), ..RayConfig::default() },
+        order: UpdateOrder::OfVoxels,
+        tiles: None,
+    }
 }
 
 /// Rays in all directions, many of them similar.
@@ -155,6 +170,56 @@ fn dense(rays: u32, reach_m: f64) -> Scan {
     };
     let intensities = (0..rays).map(|k| (k * 37 % 256) as f32).collect();
     Scan { origin, points: (0..rays).map(point).collect(), intensities: Some(intensities) }
+}
+
+#[test]
+fn batches_of_points_mark_the_voxels_of_single_rays() {
+    let setting = batched();
+    let (grid, range_m) = (&setting.grid, 4.0);
+    for rays in [255, 256, 700, 9_000] {
+        let mut scan = dense(rays, 5.0);
+        let origin = scan.origin;
+        scan.points[7] = [f64::NAN, 0.0, 0.0];
+        scan.points[250] = origin;
+        scan.points[100] = [origin[0], origin[1] + 0.1, origin[2]];
+        scan.points[101] = [origin[0], origin[1] - 3.0, origin[2]];
+        let (mut hits, mut passed, mut cut, mut skipped) = (BTreeSet::new(), BTreeSet::new(), 0, 0);
+        for &point in &scan.points {
+            let offset: Point = std::array::from_fn(|k| point[k] - origin[k]);
+            let length_m = offset.iter().map(|x| x * x).sum::<f64>().sqrt();
+            if !length_m.is_finite() || length_m < 0.2 {
+                skipped += 1;
+                continue;
+            }
+            let is_cut = length_m > range_m;
+            cut += u64::from(is_cut);
+            let end_m = match is_cut {
+                true => std::array::from_fn(|k| origin[k] + offset[k] * (range_m / length_m)),
+                false => point,
+            };
+            let [from, end] = [origin, end_m].map(|point| grid.to_voxel_units(point));
+            let [first, last] = [origin, end_m].map(|point| grid.voxel_of(point).unwrap());
+            RayWalk::between(from, first, end, last).for_each_before_end(|voxel| {
+                passed.insert(voxel);
+            });
+            if !is_cut {
+                hits.insert(last);
+            }
+        }
+        assert!(cut > 10 && skipped == 3);
+        let key = |voxel: VoxelIndex| {
+            let brick = brick_code(voxel.map(|k| k.div_euclid(BRICK_EDGE)));
+            (grid.tile_of_voxel(voxel), brick.0, place_of_voxel(voxel))
+        };
+        let misses = passed.difference(&hits).map(|&voxel| (key(voxel), vec![None]));
+        let hit = vec![Some(0.0_f32.to_bits())];
+        let naive: UpdatesByVoxel =
+            misses.chain(hits.iter().map(|&voxel| (key(voxel), hit.clone()))).collect();
+        let (by_voxel, report) = setting.whole(&scan);
+        assert!(by_voxel == naive, "{rays}");
+        assert_eq!((report.points, report.cut_at_max_range), (rays.into(), cut));
+        assert_eq!(report.skipped.total(), skipped);
+    }
 }
 
 #[test]
